@@ -4,8 +4,9 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.charger import core
-from bridges.kinds.charger.memory import ChargerMemory
+from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory
 from bridges.kinds.charger.report import ChargerReport
+from bridges.kinds.charger.settings import ChargerDurations, ChargerSettings, robot
 from bridges.kinds.charger.signals import (
     Activity,
     Cancelled,
@@ -21,6 +22,7 @@ from tests.kinds.charger.story import (
     AMR2,
     CANCEL_1,
     CHARGING,
+    FULL,
     IDLE,
     LIMITS,
     RESET,
@@ -67,6 +69,34 @@ def test_every_state_except_idle_names_the_robot_and_its_request() -> None:
         robot="AMR01",
         waits="for the station to charge tiny/AMR01",
     )
+
+
+def test_the_limits_have_the_yamls_receivers_and_whether_the_station_obeys_power() -> None:
+    class CannotStop(ChargerSettings, frozen=True, kw_only=True):
+        def can_stop(self) -> bool:
+            return False
+
+    known = ChargerLimits.of(CannotStop(receivers={"rx-1": "tiny/AMR01"}, unrequested="refuse"))
+    assert known == ChargerLimits(
+        ChargerDurations(), {"rx-1": robot("tiny/AMR01")}, "refuse", can_stop=False
+    )
+    assert ChargerLimits.of(ChargerSettings()).can_stop
+
+
+@pytest.mark.parametrize(
+    ("measured", "reason"),
+    [
+        (Measured(receiver_id=""), "for tiny/AMR01 on the pad"),
+        (Measured(receiver_id="rx-1", range_ok=False), "because the robot is not in range"),
+        (Measured(receiver_id="rx-1", in_range=False), "for tiny/AMR01 in range"),
+        (Measured(receiver_id="rx-1"), "for the station to charge tiny/AMR01"),
+    ],
+)
+def test_a_waiting_request_names_what_it_waits_for(measured: Measured, reason: str) -> None:
+    reading = Sampled(replace(IDLE.sample, measured=measured))
+    story = Story(FULL).event(reading).event(AMR1).event(reading)
+    assert story.report is not None
+    assert (story.report.state, story.report.waits) == (State.CHARGER_ASSIGNED, reason)
 
 
 def test_time_to_full_and_measurements_are_reported_but_cause_no_message() -> None:

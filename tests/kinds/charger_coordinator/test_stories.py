@@ -384,6 +384,28 @@ def test_beside_the_charging_schedule_of_rmf_its_dedicated_stations_get_requests
         end.close()
 
 
+def test_a_station_is_taken_back_if_the_schedule_sends_the_robot_elsewhere_on_its_way() -> None:
+    """RMF drives a robot only to its dedicated station."""
+    site = yard()
+    schedule = dedicate(site, AMR01="dock_b")
+    site.run(20.0)
+    site.fleet.charge("AMR01", site.now)
+    site.run(27.0)
+    again = dedicate(site, AMR01="charger_a")
+    then = [what for _, what in site.run(40.0)]
+    assert then == [
+        "AMR01 -> CHARGE charger_a",
+        "charger_b <- cancel",
+        "charger_b: RELEASED AMR01",
+        "charger_a <- charge AMR01",
+        "charger_a: ASSIGNED AMR01",
+        "charger_b: IDLE",
+        "charger_a: CHARGING AMR01",
+    ]
+    for end in (schedule, again):
+        end.close()
+
+
 def test_the_choice_of_a_charging_schedule_outlives_the_schedule() -> None:
     site = yard()
     schedule = dedicate(site, AMR01="dock_b")

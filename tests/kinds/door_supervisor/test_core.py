@@ -339,13 +339,15 @@ def test_beside_another_supervisor_ours_sends_nothing_and_keeps_its_table() -> N
     desk = Alone()
     desk.opens("a")
     desk.until(1.0)
-    desk.hears(MaySpeak(False))
+    desk.hears(MaySpeak(False, waits="for /other to go"))
     desk.opens("b")
+    assert desk.report.waits == "for /other to go"
     desk.closes("a")
     desk.shows("MOVING", until=20.0)
     assert desk.sent == [(0.0, "OPEN")]
     desk.hears(MaySpeak(True))
     assert (desk.sent, desk.holders) == ([(0.0, "OPEN"), (20.0, "OPEN")], ["b"])
+    assert desk.report.waits == ""
 
 
 # ---- DOOR-SUPERVISOR-3: the report

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from bridges.kinds.lift_supervisor import core
 from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SessionClaim, SupervisedLift
 from bridges.kinds.lift_supervisor.report import SupervisorReport
-from bridges.kinds.lift_supervisor.signals import RideRequested, Target
+from bridges.kinds.lift_supervisor.signals import RideEnded, RideRequested, Target
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.freshness import FUTURE_S, Rules
 from bridges.kinds.shared.graph_kind import MaySpeak
@@ -104,6 +104,46 @@ def test_an_end_in_the_quiet_time_removes_the_robots_claim() -> None:
     desk.hears(MaySpeak(True))
     desk.until(5.0)
     assert desk.sent == []
+
+
+def test_beside_another_supervisor_an_end_of_the_session_that_has_the_lift_is_not_sent_later() -> (
+    None
+):
+    desk = Alone()
+    desk.asks("a")
+    desk.ride("a")
+    desk.until(1.0)
+    desk.hears(MaySpeak(False))
+    desk.ends("a")
+    desk.shows("", "L3")
+    desk.hears(MaySpeak(True))
+    desk.until(5.0)
+    assert (desk.report.holder, desk.sent) == ("", [(0.0, "AGV a L3")])
+    assert core.wanted(desk.memory) is None
+
+
+def test_a_session_keeps_its_turn_if_only_other_topics_have_another_publisher() -> None:
+    desk = Alone()
+    desk.asks("a")
+    desk.until(1.0)
+    desk.hears(MaySpeak(True, alone=False))
+    assert desk.report.holder == "a"
+
+
+def test_the_lifts_node_is_told_that_a_person_has_ended_the_session() -> None:
+    """DOOR_OPEN in an END means this (`bridges/kinds/lift/messages.py`)."""
+
+    def door(*, by_person: bool) -> int:
+        desk = Alone()
+        desk.asks("a")
+        desk.ride("a")
+        desk.until(1.0)
+        desk.hears(RideEnded("a", desk.stamped(0.0), -desk.skew, by_person=by_person))
+        end = core.wanted(desk.memory)
+        assert end is not None
+        return end.door_state
+
+    assert (door(by_person=True), door(by_person=False)) == (2, 0)
 
 
 def test_beside_another_supervisor_ours_is_silent_and_afterwards_follows_the_shown_state() -> None:
