@@ -196,13 +196,12 @@ class _Ear:
 class _Mouth:
     def __init__(self, place: Place, air: Air, inner: Any) -> None:
         self._place = place
-        self._name = place.name
         self._air = air
         self._inner = inner
 
     def publish(self, message: Any) -> None:
-        self._air.watch(self._name, self._inner.topic, message)
-        self._air.speaker = self._name
+        self._air.watch(self._place.name, self._inner.topic, message)
+        self._air.speaker = self._place.name
         self._inner.publish(message)
         if self._inner.topic.name in self._air.addressed:
             self._say_to_addressee(message)
