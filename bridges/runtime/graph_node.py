@@ -42,6 +42,9 @@ MAX_REQUESTERS = 10_000
 """The maximum number of requesters, without those of lifts and doors in the YAML. No site has so many
 robots. Without this limit invented requesters would accumulate, because the node never forgets a
 holder."""
+FORGETS_EVERY_S = 1.0
+"""The least time (s) between two looks for subjects that may be forgotten. A look at each message would
+cost the supervisor of 200 doors more than the messages."""
 DEFECT = "a defect"
 
 
@@ -103,6 +106,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._shown: set[str] = set()
         self._reserved = frozenset(kind.reserved(settings))
         self._requesters = 0
+        self._forget_at = self._started_at
         for name, memory in self._keeper.restore(settings, self._started_at).items():
             self._add(name, memory)
 
@@ -152,6 +156,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         while self._orders:
             self._decide_all(self._orders.popleft())
         self._wake()
+        self._forget()
         memories = {name: subject.memory for name, subject in self.subjects.items()}
         now = self._clock.monotonic()
         self._keeper.keep(self._real(memories), now)
@@ -257,9 +262,16 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     def _wake(self) -> None:
         now = self._clock.monotonic()
+        for subject in [one for one in self.subjects.values() if now >= one.wake_at]:
+            self._decide(subject, Woken())
+
+    def _forget(self) -> None:
+        """Forget the subjects of which nothing has been heard for long."""
+        now = self._clock.monotonic()
+        if now < self._forget_at:
+            return
+        self._forget_at = now + FORGETS_EVERY_S
         for subject in list(self.subjects.values()):
-            if now >= subject.wake_at:
-                self._decide(subject, Woken())
             if self._kind.idle(subject.memory, now):
                 self._requesters -= self._remembered(subject)
                 del self.subjects[subject.name]

@@ -247,6 +247,28 @@ def test_of_a_lift_long_gone_a_waiting_robot_is_forgotten_and_its_holder_never()
     assert list(site.node.subjects) == ["Lift1"]
 
 
+def test_a_flood_of_states_asks_each_lift_once_a_second_whether_it_may_be_forgotten() -> None:
+    site, looks = Site(), 0
+
+    def idle(memory: Any, now: float) -> bool:
+        nonlocal looks
+        looks += 1
+        return KIND.idle(memory, now)
+
+    site.node._kind = replace(KIND, idle=idle)
+    site.until(3.0)
+    for lift in ("Lift1", "Lift2"):
+        site.lift.publish(LiftState(lift_name=lift))
+        site.node.round()
+    site.until(5.0)
+    looks = 0
+    for _ in range(150):
+        site.now += 0.01
+        site.lift.publish(LiftState(lift_name="Lift1"))
+        site.node.round()
+    assert looks == 2  # one second has ended
+
+
 def test_a_defect_in_a_core_costs_one_message_and_is_logged_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:

@@ -13,7 +13,7 @@ from msgspec import Struct
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
-from workbench.rmf_model import NEVER, Party, Said, door_request, has_session
+from workbench.rmf_model import NEVER, Party, Said, door_request
 
 
 class LiftDestination(Struct, frozen=True):
@@ -191,6 +191,6 @@ class RobotContext(Party):
         return [
             self.ask_door(door.door_name, d.DoorModeValue.MODE_CLOSED, now)
             for door in heartbeat.all_sessions
-            if has_session(heartbeat, self.requester_id, door.door_name)
+            if any(session.requester_id == self.requester_id for session in door.sessions)
             and door.door_name != self.holding_door
         ]

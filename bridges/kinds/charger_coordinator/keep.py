@@ -70,7 +70,7 @@ def persist(memories: Mapping[str, SiteMemory]) -> bytes:
         {str(who): task for who, task in sorted(memory.served.items())},
         list(memory.over),
         {str(who): station for who, station in sorted(memory.preferred.items()) if station},
-        {str(who): place for who in sorted(memory.known) if (place := memory.place_of(who))},
+        {str(who): place for who, place in sorted(memory.places.items()) if place},
     )
     return msgspec.json.encode(record)
 

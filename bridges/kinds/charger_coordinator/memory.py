@@ -1,7 +1,7 @@
 """The values that the coordinator keeps from one event to the next, and the settings that it needs (its
 limits)."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, TypeVar
 
@@ -271,9 +271,19 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return replace(self, robots=heard, stood={})
 
     @property
-    def known(self) -> Iterable[RobotName]:
-        """The robots that their fleet has reported, now or before our restart."""
-        return {**self.stood, **self.robots}
+    def places(self) -> Mapping[RobotName, str | None]:
+        """The waypoint of every robot that its fleet has reported, now or before our restart; see
+        `place_of`."""
+        return {**self.stood, **{who: seen.sighting.place for who, seen in self.robots.items()}}
+
+    @property
+    def allotted(self) -> Mapping[RobotName, str]:
+        """The station of every robot that has one."""
+        found: dict[RobotName, str] = {}
+        for name, grant in self.grants.items():
+            if not grant.over:
+                found.setdefault(grant.robot, name)
+        return found
 
     def here_since(self, robot: RobotName) -> float:
         """Return the time since which the robot has been at its place, as far as known."""

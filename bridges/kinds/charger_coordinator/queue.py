@@ -63,6 +63,12 @@ def _granted(
     return replace(memory, count=count).with_grant(station, grant)
 
 
+def queued(memory: SiteMemory) -> list[Wish]:
+    """List the wishes without a station, in the order of service."""
+    allotted = memory.allotted
+    return [wish for wish in memory.wishes if wish.robot not in allotted]
+
+
 def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:
     """List the stations to try, best first.
 
@@ -109,8 +115,8 @@ def standing(memory: SiteMemory, site: SiteLimits) -> Here:
     operator's reset such a robot no longer counts.
     """
     here: dict[str, list[RobotName]] = {}
-    for who in memory.known:
-        station = memory.stands_at(who, site)
+    for who, place in memory.places.items():
+        station = site.station_at(who.fleet, place)
         if station is not None:
             here.setdefault(station, []).append(who)
     return here

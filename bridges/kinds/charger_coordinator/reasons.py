@@ -16,18 +16,12 @@ from bridges.kinds.charger_coordinator.memory import (
     WHOSE,
     SiteLimits,
     SiteMemory,
-    Wish,
 )
-from bridges.kinds.charger_coordinator.queue import Here, in_the_way, standing, suiting
+from bridges.kinds.charger_coordinator.queue import Here, in_the_way, queued, standing, suiting
 from bridges.kinds.shared.durations import NEVER
 
 MOST: Final = 4
 """The greatest number of stations that the queue shows for one robot."""
-
-
-def queued(memory: SiteMemory) -> list[Wish]:
-    """List the wishes without a station, in the order of service."""
-    return [wish for wish in memory.wishes if memory.station_of(wish.robot) is None]
 
 
 def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:

@@ -31,7 +31,8 @@ from bridges.kinds.charger_coordinator.memory import (
     SiteMemory,
     StationSeen,
 )
-from bridges.kinds.charger_coordinator.reasons import queued, reasons, where
+from bridges.kinds.charger_coordinator.queue import queued
+from bridges.kinds.charger_coordinator.reasons import reasons, where
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import due_at
 from bridges.messages import definitions as d
@@ -247,8 +248,9 @@ def _assignments(
     waiting, and a robot without a station gets MODE_CHARGE there (`wrong_pad.py`).
     """
     fleets: dict[str, list[d.ChargingAssignment]] = {}
+    allotted = memory.allotted
     for who in sorted(site.robots):
-        station, told = memory.station_of(who), wrong_pad.is_nudged(memory, who, now)
+        station, told = allotted.get(who), wrong_pad.is_nudged(memory, who, now)
         charges = (station is None) == told
         mode = d.ChargingMode.MODE_CHARGE if charges else d.ChargingMode.MODE_WAIT
         place = site.places[station][who.fleet] if station and not told else site.waits_at[who]

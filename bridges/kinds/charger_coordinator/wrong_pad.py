@@ -29,7 +29,7 @@ from bridges.kinds.charger.pad import misplaced_in
 from bridges.kinds.charger.report import FaultCause
 from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.memory import CHARGING, Nudge, SiteLimits, SiteMemory
-from bridges.kinds.charger_coordinator.queue import Here, standing, suiting
+from bridges.kinds.charger_coordinator.queue import Here, queued, standing, suiting
 from bridges.kinds.charger_coordinator.wishes import SETTLES_S
 from bridges.kinds.shared.durations import NEVER
 
@@ -128,9 +128,7 @@ def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWr
     """Yield robots without a station that stand on a pad for which another robot waits."""
     here = standing(memory, site)
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
-    for wish in memory.wishes if idle else ():
-        if memory.station_of(wish.robot) is not None:
-            continue
+    for wish in queued(memory) if idle else ():
         for name in suiting(memory, wish, site):
             who, seen = idle.get(name), memory.stations.get(name)
             if who is None or who == wish.robot or seen is None:

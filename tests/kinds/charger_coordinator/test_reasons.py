@@ -15,7 +15,8 @@ from bridges.kinds.charger_coordinator.memory import (
     StationSeen,
     Wish,
 )
-from bridges.kinds.charger_coordinator.reasons import queued, reasons
+from bridges.kinds.charger_coordinator.queue import queued
+from bridges.kinds.charger_coordinator.reasons import reasons
 from bridges.kinds.charger_coordinator.schedule import Charging
 from bridges.kinds.charger_coordinator.signals import Sighting
 from bridges.messages.definitions import ChargerStateValue
