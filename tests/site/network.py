@@ -12,7 +12,7 @@ cut off for longer loses all samples of that time. Afterwards it gets the messag
 retain.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from random import Random
@@ -57,8 +57,8 @@ class Air:
     RMF's nodes do. `watch` gets all samples.
 
     With `sorts`, a node gets no message that it would drop unread: a device gets only messages that
-    name it (`Place.subscribe_to`), and `Place.heeds` decides for the other nodes. In a hospital with
-    200 doors all but a few of the samples would be such messages.
+    name it (`Place.subscribe_to`), and a robot only states that it `heeds`. In a hospital with 200
+    doors all but a few of the samples would be such messages.
     """
 
     def __init__(self, timeline: Timeline, random: Random) -> None:
@@ -72,6 +72,7 @@ class Air:
         self.counts = dict.fromkeys(("sent", "arrived", "lost", "late", "twice"), 0)
         self.sorts = False
         self.addressed: dict[str, tuple[NameOf, dict[str, list[_Ear]]]] = {}
+        self.heeding: dict[str, list[_Ear]] = {}
         self._random = random
         self._cut: dict[str, float] = {}
         self._arrived: dict[tuple[str, str, str], float] = {}
@@ -109,8 +110,6 @@ class Air:
         self, hearer: "Place", topic: Topic[Any], received: Callable[[Any], None], message: Any
     ) -> None:
         """Carry one sample to one subscription."""
-        if self.sorts and not hearer.heeds(message):
-            return
         self.counts["sent"] += 1
         delays = self.delays(self.speaker, hearer.name, topic)
         link = (self.speaker, hearer.name, topic.name)
@@ -140,11 +139,11 @@ class Air:
 
 class Place(MemoryTransport):
     """One node's place on the graph. `heard` runs after each sample that the node gets. `heeds` returns
-    whether a message can change anything at this node."""
+    whether a state can change anything at this node; None for a node that heeds every state."""
 
     def __init__(self, air: Air, name: str, heard: Callable[[], None]) -> None:
         super().__init__(air.memory, name, air.release)
-        self.heeds: Callable[[Any], bool] = lambda message: True
+        self.heeds: Callable[[Any], bool] | None = None
         self._air = air
         self._heard = heard
 
@@ -154,6 +153,9 @@ class Place(MemoryTransport):
     def subscribe(
         self, topic: Topic[Any], received: Callable[[Any], None], *, others_only: bool = False
     ) -> Any:
+        if self._air.sorts and self.heeds and topic.name in STATES:
+            _add(self._air.heeding.setdefault(topic.name, []), _Ear(self, received, others_only))
+            return None
         carried = partial(self._air.carry, self, topic, received)
         return super().subscribe(topic, carried, others_only=others_only)
 
@@ -172,8 +174,7 @@ class Place(MemoryTransport):
             self.subscribe(topic, received, others_only=others_only)
             return
         ears = self._air.addressed.setdefault(topic.name, (name_of, {}))[1].setdefault(name, [])
-        ears[:] = [ear for ear in ears if ear.place.lives]
-        ears.append(_Ear(self, received, others_only))
+        _add(ears, _Ear(self, received, others_only))
 
     def arrive(self, received: Callable[[Any], None], message: Any, sender: Sender | None) -> None:
         """Hand the message over if the node is still on the graph."""
@@ -186,11 +187,16 @@ class Place(MemoryTransport):
 
 @dataclass(frozen=True)
 class _Ear:
-    """A device's subscription to messages with its name."""
+    """A device's subscription to messages with its name, or a robot's subscription to states."""
 
     place: Place
     received: Callable[[Any], None]
     others_only: bool
+
+
+def _add(ears: list[_Ear], ear: _Ear) -> None:
+    """Add an ear in place of those of nodes that have left the graph."""
+    ears[:] = [*(one for one in ears if one.place.lives), ear]
 
 
 class _Mouth:
@@ -203,16 +209,21 @@ class _Mouth:
         self._air.watch(self._place.name, self._inner.topic, message)
         self._air.speaker = self._place.name
         self._inner.publish(message)
-        if self._inner.topic.name in self._air.addressed:
-            self._say_to_addressee(message)
-        self._air.speaker = RETAINED
-
-    def _say_to_addressee(self, message: Any) -> None:
-        name_of, ears = self._air.addressed[self._inner.topic.name]
-        for ear in ears.get(name_of(message), ()):
+        for ear in self._ears(message):
             if ear.place.lives and not (ear.others_only and ear.place is self._place):
                 ear.place.heard_from = self._inner.sender
                 self._air.carry(ear.place, self._inner.topic, ear.received, message)
+        self._air.speaker = RETAINED
+
+    def _ears(self, message: Any) -> Iterator[_Ear]:
+        """Yield the ears that a sorting network finds for the message."""
+        topic = self._inner.topic.name
+        if topic in self._air.addressed:
+            name_of, ears = self._air.addressed[topic]
+            yield from ears.get(name_of(message), ())
+        for ear in self._air.heeding.get(topic, ()):
+            if ear.place.heeds is None or ear.place.heeds(message):
+                yield ear
 
     def matched(self) -> int:
         return int(self._inner.matched())
