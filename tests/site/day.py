@@ -258,6 +258,9 @@ class Site:
         self.laws.in_doorway(robot.name, door)
         self._obstruct(door)
 
+    def may_enter_pad(self, charger: str) -> bool:
+        return all(robot.pad != charger for robot in self.robots)
+
     def on_pad(self, robot: Resident, charger: str) -> None:
         self.laws.on_pad(robot.name, charger)
         self._press(charger, "robot", True)

@@ -75,6 +75,9 @@ class Ground(Protocol):
     def in_doorway(self, robot: "Resident", door: str) -> None:
         """Let the robot stand in the doorway."""
 
+    def may_enter_pad(self, charger: str) -> bool:
+        """Return whether a robot sees that no robot stands on the pad."""
+
     def on_pad(self, robot: "Resident", charger: str) -> None:
         """Note the robot's arrival on the pad."""
 
@@ -364,8 +367,8 @@ class Resident:
         if flowed:
             self._task.battery = 100.0
             yield self._random.uniform(1.0, 10.0)
-        self._task.place = ""
         yield from self._off_pad()
+        self._task.place = ""
         self.done["charges"] += flowed
         return flowed
 
@@ -402,8 +405,12 @@ class Resident:
         return False
 
     def _charge_at(self, charger: str, request_id: str) -> Generator[Want, bool, bool]:
-        """Charge on the pad while the station shows our request. Return True if current has flowed."""
-        if not self._is_ours(charger, request_id):
+        """Charge on the pad while the station shows our request. Return True if current has flowed.
+
+        Without a coordinator only the robot itself can see that a robot with a dead adapter stands on
+        the pad: these stations cannot tell, and show IDLE after a full charge.
+        """
+        if not self._is_ours(charger, request_id) or not self._ground.may_enter_pad(charger):
             return False
         yield PAD_S
         self.pad = charger
