@@ -14,6 +14,7 @@ from bridges.kinds.charger_coordinator.memory import (
     IDLE,
     RELEASED,
     Grant,
+    Nudge,
     SiteLimits,
     Wish,
 )
@@ -127,6 +128,34 @@ def test_a_reset_tries_faulty_robots_and_passed_over_stations_again() -> None:
     assert site_.run(5) == []
     assert answer(site_, OperatorReset()) == ""
     assert site_.run(1)[0] == (18.0, "charger_a: AMR01")
+
+
+@pytest.mark.parametrize("event", [OperatorReset(), MaySpeak(True)])
+def test_a_reset_or_a_new_permission_to_publish_forgets_the_orders_to_leave_a_pad(
+    event: Event,
+) -> None:
+    site_ = Alone()
+    grants, nudges = {A: Grant(ONE, "r1", 0.0)}, {ONE: Nudge("r1", 2, 5.0)}
+    site_.memory = replace(site_.memory, grants=grants, nudges=nudges, absent={TWO: 900.0})
+    site_.hears(Woken())
+    assert site_.memory.nudges == nudges
+    site_.hears(event)
+    assert site_.memory.nudges == {}
+    assert bool(site_.memory.absent) is isinstance(event, MaySpeak)
+
+
+def test_while_another_node_serves_each_waiting_robot_is_told_so() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.hears(MaySpeak(False, waits="while /other publishes charger_requests"))
+    site_.run(1)
+    assert site_.report.queue == (
+        "tiny/AMR01 by the robot: while /other publishes charger_requests",
+    )
+    assert (site_.report.waiting, site_.report.assigns) == ((ONE,), "no")
+    site_.hears(MaySpeak(True))
+    site_.run(1)
+    assert (site_.report.waiting, site_.report.assigns) == ((), "yes")
 
 
 def test_no_event_that_counts_is_refused() -> None:

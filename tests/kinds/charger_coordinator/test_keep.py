@@ -67,7 +67,8 @@ def test_a_restart_remembers_everything_that_it_keeps() -> None:
     site_.hears(ChargeWanted(TWO, A, "op-2", 44.0))
     site_.wants(THREE)
     site_.run(1)
-    before = replace(site_.memory, served={THREE: "task of AMR03"})
+    wishes = tuple(replace(wish, called=wish.robot == THREE) for wish in site_.memory.wishes)
+    before = replace(site_.memory, wishes=wishes, served={THREE: "task of AMR03"})
     after = keep.restore(keep.persist({"site": before}), SETTINGS, 50.0)["site"]
     assert (after.wishes, after.strikes, after.served) == (
         before.wishes,

@@ -1,5 +1,6 @@
 """COORDINATOR-2: the queue gives stations to permitted robots only, first come, first served."""
 
+import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.charger_coordinator import keep
@@ -7,7 +8,12 @@ from bridges.kinds.charger_coordinator.memory import (
     CHARGING,
     ERROR,
     IDLE,
+    RELEASED,
+    SiteLimits,
+    Standing,
+    Wish,
 )
+from bridges.kinds.charger_coordinator.queue import suiting
 from bridges.kinds.charger_coordinator.signals import (
     ChargerStateHeard,
     Dedicated,
@@ -15,6 +21,7 @@ from bridges.kinds.charger_coordinator.signals import (
     Sighting,
 )
 from bridges.kinds.shared.decision import OperatorReset
+from bridges.messages import definitions as d
 from tests.kinds.charger_coordinator.alone import (
     ONE,
     SETTINGS,
@@ -87,6 +94,35 @@ def test_a_reset_frees_the_pad_of_a_robot_whose_fleet_is_silent_and_no_other_pad
     assert site_.run(1) == []
     site_.hears(OperatorReset())
     assert site_.run(1) == [(31.0, "charger_a: AMR01")]
+
+
+def test_a_reset_after_a_restart_frees_the_pad_where_a_robot_of_a_silent_fleet_stood() -> None:
+    site_ = silent_at_a()
+    kept = keep.persist({"site": site_.memory})
+    site_.memory = replace(keep.restore(kept, SETTINGS, 0.0)["site"], may_speak=True)
+    assert site_.run(1) == []
+    site_.hears(OperatorReset())
+    assert site_.run(1) == [(2.0, "charger_a: AMR01")]
+
+
+@pytest.mark.parametrize("state", [CHARGING, RELEASED])
+def test_a_robot_that_charges_without_a_request_may_have_that_station_and_no_released_one(
+    state: d.ChargerStateValue,
+) -> None:
+    site_ = Alone()
+    site_.shows = {A: ChargerStateHeard(A, state, "unrequested/charger_a", ONE), B: busy(B)}
+    site_.wants(ONE, "charger_a")
+    assert site_.run(1) == ([(1.0, "charger_a: AMR01")] if state is CHARGING else [])
+
+
+def test_beside_a_charging_schedule_a_robot_without_a_dedicated_station_may_have_only_its_place() -> (
+    None
+):
+    memory = replace(Alone().memory, alone=False)
+    for place, stations in (("charger_a", [A]), ("wait_1", [])):
+        seen = {ONE: Standing(Sighting(ONE, True, place, 40.0, ""), 0.0)}
+        at_place = replace(memory, robots=seen)
+        assert suiting(at_place, Wish(ONE, "fleet"), SiteLimits.of(SETTINGS)) == stations
 
 
 def test_a_robot_that_stands_at_a_station_gets_that_station() -> None:

@@ -1,21 +1,30 @@
 """The coordinator's report and the texts in it. Also the times at which the core asks to be woken."""
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.kinds.charger_coordinator import core, report
 from bridges.kinds.charger_coordinator.memory import (
+    ASSIGNED,
     CHARGING,
     ERROR,
     IDLE,
+    Grant,
+    Nudge,
     SiteLimits,
+    SiteMemory,
+    Standing,
+    StationSeen,
 )
 from bridges.kinds.charger_coordinator.signals import (
     ChargerStateHeard,
     ChargeUnwanted,
+    Sighting,
 )
+from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages import definitions as d
-from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, A, Alone, B
+from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, TWO, A, Alone, B
 
 SITE = SiteLimits.of(SETTINGS)
 
@@ -93,6 +102,53 @@ def test_the_assignments_are_published_again_after_a_rival_has_gone() -> None:
     assert published(Woken()) == []
     assert published(MaySpeak(False)) == []
     assert published(MaySpeak(True)) == ["charging_assignments"]
+
+
+def test_the_report_tells_which_robot_was_told_to_leave_another_pad() -> None:
+    site_ = Alone()
+    site_.wants(ONE)
+    site_.run(1)
+    told = {ONE: Nudge(site_.memory.grants[A].request_id, 1, 1.0)}
+    shown = report.report(replace(site_.memory, nudges=told), site_.now, SITE)
+    assert shown.stations[0] == (A, "IDLE tiny/AMR01, by the robot, told to leave another pad")
+    unknown = report.report(replace(site_.memory, wishes=()), site_.now, SITE)
+    assert unknown.stations[0] == (A, "IDLE tiny/AMR01")
+
+
+def test_an_assignment_is_repeated_for_a_robot_with_a_station_that_stands_idle_elsewhere() -> None:
+    idle = Standing(Sighting(ONE, False, "wait_1", 40.0, ""), 2.0)
+    other = Standing(Sighting(TWO, False, "wait_2", 40.0, ""), 2.0)
+    grant = Grant(ONE, "r1", 5.0)
+    memory = SiteMemory(
+        may_speak=True, robots={ONE: idle, TWO: other}, grants={A: grant, B: Grant(TWO, "r2", 9.0)}
+    )
+    assert sorted(report.due(memory, SITE))[-2:] == [20.0, 24.0]
+    for done in (replace(grant, started=True), replace(grant, over=True)):
+        one = replace(memory, grants={A: done, B: memory.grants[B]})
+        assert [at for at in report.due(one, SITE) if 20.0 <= at < 99.0] == [24.0]
+    for change in ({"task_id": "work"}, {"place": None}, {"place": "charger_a"}):
+        seen = replace(idle, sighting=replace(idle.sighting, **change))
+        one = replace(memory, robots={ONE: seen, TWO: other})
+        assert [at for at in report.due(one, SITE) if 20.0 <= at < 99.0] == [24.0]
+
+
+def test_a_cancel_is_repeated_only_while_the_station_shows_the_cancelled_request() -> None:
+    over = Grant(ONE, "r1", 5.0, over=True, sent_at=7.0)
+    for request_id, at in (("r1", 8.0), ("r2", NEVER)):
+        seen = StationSeen(ASSIGNED, request_id, ONE, "", 7.0, 7.0)
+        memory = SiteMemory(may_speak=True, grants={A: over}, stations={A: seen})
+        assert report.due(memory, SITE)[-1] == at
+
+
+def test_a_robot_on_a_pad_that_nobody_requested_is_a_fault_after_five_seconds() -> None:
+    error = "wrong docking: tiny/AMR01 is not assigned here"
+    seen = StationSeen(ERROR, "", None, error, 12.0, 10.0)
+    memory = SiteMemory(
+        may_speak=True, stations={A: seen, B: StationSeen(IDLE, "", None, "", 14, 0)}
+    )
+    faults = [report.report(memory, now, SITE).faults for now in (14.9, 15.0)]
+    assert [[fault.code for fault in them] for them in faults] == [[], ["WRONG_STATION"]]
+    assert 15.0 in report.due(memory, SITE)
 
 
 def wakes(site_: Alone) -> float:

@@ -107,6 +107,14 @@ def test_a_robot_released_without_a_charge_did_not_come_or_has_failed(
     )
 
 
+def test_a_station_that_forgets_a_charge_of_the_robot_on_its_pad_is_asked_again() -> None:
+    grant = replace(GRANT, request_id="charger_coordinator/tiny/AMR01/1", started=True)
+    memory = site(grants={A: grant}, robots={ONE: at(ONE, "charger_a")})
+    assert after(memory, IDLE, request_id="").grants == {
+        A: replace(grant, shown=False, started=False, sent_at=AGES_AGO, forgotten_at=30.0)
+    }
+
+
 def test_a_charge_that_ends_fulfils_the_wish() -> None:
     memory = site(grants={A: replace(GRANT, started=True)}, strikes={ONE: (B,)})
     over = replace(GRANT, started=True, over=True)
