@@ -121,7 +121,10 @@ class Air:
             self.counts["lost"] += 1
 
     def _found_again(self, name: str, lost: bool) -> None:
-        if not lost or self._cut.get(name, NEVER) > self.timeline.now:
+        if self._cut.get(name, NEVER) > self.timeline.now:
+            return
+        del self._cut[name]
+        if not lost:
             return
         for end in [end for ends in self.memory.subscriptions.values() for end in ends]:
             if end.node.name == name:

@@ -1,17 +1,20 @@
 """A short day at the site for a few random seeds. `make soak` plays whole days."""
 
+from random import Random
 from typing import Any
 
 import pytest
 
 from bridges.kinds.lift import forgotten
-from bridges.messages.topics import Topic
+from bridges.messages.topics import LIFT_STATES, Topic
 from tests.depth import depth
 from tests.site.building import hospital
 from tests.site.daemons import DeviceDaemon
 from tests.site.day import Site
 from tests.site.growth import Look, growth
 from tests.site.laws import Broken, Laws
+from tests.site.network import Air
+from tests.site.timeline import Timeline
 
 SEEDS = depth([2], [1, 2, 3])
 """The seeds of the days. They differ in the kind of supervisors. tests/workbench/replay/test_replay.py
@@ -36,6 +39,19 @@ def test_a_site_survives_its_troubles(seed: int) -> None:
     assert sum(site.trouble.counts.values()) > depth(1, 5)
     assert done["dispensings"] == 1
     assert done["drills and alarms"] >= depth(2, 7)
+
+
+def test_nodes_that_were_once_cut_off_hear_each_other_as_late_as_before() -> None:
+    timeline = Timeline()
+    air = Air(timeline, Random(1))
+    for name, until in (("lift", 5.0), ("supervisor", 30.0), ("supervisor", 20.0)):
+        air.cut_off(name, until)
+    timeline.run(4.0)
+    assert air.delays("lift", "supervisor", LIFT_STATES) == ()  # the cut lasts longer than a lease
+    timeline.run(3600.0)
+    delays = [d for _ in range(500) for d in air.delays("lift", "supervisor", LIFT_STATES)]
+    assert min(delays) >= 0.002
+    assert max(delays) > 0.5
 
 
 @pytest.mark.long(3)

@@ -33,6 +33,9 @@ ASKS_S: Final = 6.0
 is that RMF's restarted supervisor also ends the session of a robot that is still in the car."""
 REPEATED_S: Final = 1.0
 """Time (s) for which an END with an old stamp must be repeated before it counts."""
+BROKEN_OFF_S: Final = 3.0
+"""The longest pause (s) between two such ENDs. RMF repeats an END at each state, which comes each
+second."""
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 
@@ -89,8 +92,9 @@ class Ending:
     - `at`: the first END.
     - `bare_at`: the first END, if it has no floor.
     - `floor_at`: the first END with a floor.
-    - `old_at`: the first END whose stamp is older than a stamp of the session's requests. A lift may
-      take such an END for an END of an earlier ride, until the END is repeated for REPEATED_S.
+    - `old_at`, `old_again_at`: the first and the last END whose stamp is older than a stamp of the
+      session's requests. A lift may take such an END for an END of an earlier ride, until the END is
+      repeated for REPEATED_S. After a pause of BROKEN_OFF_S an END is a first END again.
 
     RMF's supervisor first sends an END without a floor. If the lift still shows the session, the
     supervisor sends an END with a floor.
@@ -100,6 +104,7 @@ class Ending:
     bare_at: float = NOT_YET
     floor_at: float = NOT_YET
     old_at: float = NOT_YET
+    old_again_at: float = NOT_YET
 
 
 class LiftHistory(History[d.LiftState]):
@@ -288,7 +293,9 @@ class LiftHistory(History[d.LiftState]):
             return
         ending, stamp = self.ending, in_seconds(message.request_time)
         if ask is not None and 0.0 < stamp < ask.stamp:
-            ending.old_at = self.now if ending.old_at == NOT_YET else ending.old_at
+            broken_off = self.now > ending.old_again_at + BROKEN_OFF_S
+            ending.old_at = self.now if broken_off else ending.old_at
+            ending.old_again_at = self.now
             if self.now - ending.old_at < REPEATED_S:
                 return
         ending.at = self.now if ending.at == NOT_YET else ending.at

@@ -331,6 +331,15 @@ LIFT: list[tuple[str, Story, float, float]] = [
         0.9,
         1.1,
     ),
+    (  # such an END after a long pause is a first END again
+        "L5.ends",
+        lambda x: [
+            *(car(0.0), asks(0.5), held(1.0), ends(2.0, by_clock_s=-9.0), held(4.0)),
+            *(ends(2.0 + x, by_clock_s=-9.0), held(8.0), held(9.0)),
+        ],
+        3.1,
+        2.9,
+    ),
     ("L5.ends", lambda x: rides_with_bare_ends(int(x)), 2, 3),
     ("L5.ends", lambda x: rides_with_bare_ends(3, goes_s=x), 0.31, 0.29),
     ("L5.ends", lambda x: rides_with_bare_ends(3, waits_s=x), 0.29, 0.31),
