@@ -42,6 +42,7 @@ class Ills:
         self._timeline = timeline
         self._now: dict[str, dict[str, float]] = {}
         self._over: dict[str, dict[str, float]] = {}
+        self._well_at: dict[str, float] = {}
         self._modes: dict[tuple[str, str], FailureMode] = {}
         self._obstructed: dict[str, float] = {}
         self._calm_at = 0.0
@@ -56,7 +57,7 @@ class Ills:
         """Note the end of an ill."""
         del self._now[device][what]
         self._over.setdefault(device, {})[what] = self._timeline.now
-        self._calm_at = self._timeline.now
+        self._well_at[device] = self._calm_at = self._timeline.now
 
     def has(self, device: str, what: str) -> bool:
         """Return whether the device has this ill."""
@@ -79,7 +80,7 @@ class Ills:
         """Return the end of the device's last ill. During an ill return inf."""
         if self.any(device):
             return NEVER
-        return max(self._over.get(device, {}).values(), default=-NEVER)
+        return self._well_at.get(device, -NEVER)
 
     def lying(self, device: str, settles_s: float) -> Iterator[str]:
         """Yield the wires and parts that give wrong values now, or did so in the last `settles_s`
