@@ -99,3 +99,14 @@ def test_a_fault_says_what_is_wrong(what: str) -> None:
     for now, event in happenings:
         alone(now, event)
     assert alone.faults == (fault,)
+
+
+def test_a_request_that_waits_is_explained_by_its_mode_or_by_the_faults_that_hinder_it() -> None:
+    human = Alone()(0.0, AT_L1)(5.0, AT_L1, LiftRequested("A", False, "L3"))
+    assert human.decision.report.waits == "for END: in HUMAN mode people call the lift"
+    lift = Alone()(0.0, AT_L1)(5.0, AT_L1, ASKED)(5.2, LiftRequested("B", True, "L3"))
+    unwell = replace(AT_L1, hazards=frozenset({Hazard.CODE_BLUE, Hazard.OUT_OF_SERVICE}))
+    lift(5.3, unwell)(9.0, unwell)
+    codes = [fault.code for fault in lift.faults]
+    assert codes == ["CODE_BLUE", "OUT_OF_SERVICE", "FORGOTTEN_BY_SUPERVISOR"]
+    assert lift.decision.report.waits == "for the end of CODE_BLUE, OUT_OF_SERVICE"
