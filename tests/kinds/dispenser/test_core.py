@@ -12,10 +12,18 @@ from msgspec.structs import replace
 
 from bridges.kinds.dispenser import core
 from bridges.kinds.dispenser.keep import persist, restore
-from bridges.kinds.dispenser.memory import Job, WorkcellLimits, WorkcellMemory
+from bridges.kinds.dispenser.memory import (
+    Cycle,
+    Job,
+    WorkcellLimits,
+    WorkcellMemory,
+    WorkcellSenses,
+    changes,
+)
 from bridges.kinds.dispenser.report import WorkcellReport
 from bridges.kinds.dispenser.settings import WorkcellDurations
 from bridges.kinds.dispenser.signals import Item, ItemRequested, WorkcellOutputs, WorkcellSample
+from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.decision import (
     DecidedByPerson,
     IoFailed,
@@ -27,6 +35,8 @@ from bridges.kinds.shared.decision import (
     Suspended,
     WriteFailed,
 )
+from bridges.kinds.shared.durations import NEVER
+from bridges.messages.constants import WorkcellMode
 from bridges.messages.definitions import WorkcellStatus
 
 BOX = Item("box", 1)
@@ -210,3 +220,139 @@ def test_one_request_twice_in_the_memory_is_refused() -> None:
     twice = WorkcellMemory(jobs=(Job("a", kept="queued"), Job("a", kept="queued")))
     with pytest.raises(ValueError, match="one request is in the memory twice"):
         restore(persist(twice), 0.0)
+
+
+# ---- what people and RMF are told
+
+
+def test_a_running_cycle_is_shown_as_busy_with_its_request_and_items() -> None:
+    idle, busy = Cell().take(Sampled(CALM), at=10.0).report, running().report
+    assert (idle.mode, idle.running, idle.item, idle.waits) == (WorkcellMode.IDLE, "", "", "")
+    assert (busy.mode, busy.running, busy.item, busy.waits) == (
+        WorkcellMode.BUSY, "task", "1 box", "",
+    )  # fmt: skip
+
+
+def test_each_obstacle_says_what_is_wrong() -> None:
+    new = Cell().take(RivalSeen(), at=1.0)
+    assert new.faults == [
+        "TWO_NODES_FOR_ONE_DEVICE: another node publishes states of this workcell"
+    ]
+    assert new.take(RivalSeen(), at=6.0).take(MemoryKept(), at=11.0).faults == []
+    assert new.report.mode == WorkcellMode.OFFLINE  # nothing has been read yet
+    cell = Cell().take(Sampled(replace(CALM, errors=("a jam", "an open lid"))), at=10.0)
+    assert cell.faults == ["WORKCELL_FAULT: a jam; an open lid"]
+    assert cell.take(Sampled(replace(CALM, fault=True)), at=10.25).faults == [
+        "WORKCELL_FAULT: its fault contact is on"
+    ]
+    assert cell.take(Sampled(CALM), at=10.5).take(MemoryKept(), at=11.5).faults == [
+        "COMMUNICATION_LOST: no reading for 1.0 s"
+    ]
+
+
+def test_a_request_whose_inputs_bounce_says_so() -> None:
+    cell = Cell(replace(STEADY, debounce={"ready": 0.5})).take(Sampled(CALM), at=10.0)
+    assert cell.take(ASKS, MemoryKept()).report.waits == "for its inputs to be steady"
+    assert cell.wake_at == 10.5
+
+
+@pytest.mark.parametrize(("count", "more"), [(3, ""), (5, "; and 2 more")])
+def test_requests_from_before_a_lost_memory_are_in_doubt_and_the_first_three_are_named(
+    count: int, more: str
+) -> None:
+    cell = Cell().take(Sampled(CALM), at=10.0)
+    cell.memory = replace(cell.memory, lost="a full disk")
+    cell.take(*(replace(ASKS, guid=f"t{n}") for n in range(count)))
+    why = "(1 box for fleet): asked for before this daemon remembers"
+    decide = "decide: rmf-bridge workcell done, again or failed"
+    assert cell.faults == [
+        f"MEMORY_LOST: a full disk; {decide}",
+        f"OUTCOME_UNKNOWN: t0 {why}; t1 {why}; t2 {why}{more}; look, then {decide}",
+    ]
+
+
+def test_a_finished_guid_that_comes_again_with_other_items_or_after_silence_is_in_doubt() -> None:
+    for again, silent_s, why in (
+        (Item("jar", 2), 1.0, "asked for 2 jar under the guid of a request for 1 box (done)"),
+        (BOX, 300.0, "done, and asked for again after RMF was silent for 300 s"),
+    ):
+        cell = running().take(Sampled(replace(CALM, done=True)), MemoryKept(), at=11.0)
+        cell.take(Sampled(CALM), at=10.0 + silent_s)
+        [job] = cell.take(replace(ASKS, item=again)).memory.jobs
+        assert job == replace(
+            job, phase="doubtful", item=again, why=why, asked_at=cell.now, due=True, closed=False
+        )
+
+
+@pytest.mark.parametrize(
+    ("verdict", "phase", "why"),
+    [
+        ("done", "done", ""),
+        ("again", "queued", ""),
+        ("failed", "failed", "a person has decided so"),
+    ],
+)
+def test_a_person_decides_one_request_or_all_with_the_lost_memory(
+    verdict: Any, phase: Any, why: str
+) -> None:
+    doubts = tuple(Job(guid, BOX, phase="doubtful", why="?", asked_at=9.0) for guid in "ab")
+    cell = Cell().take(Sampled(CALM), at=10.0)
+    cell.memory = replace(cell.memory, jobs=doubts, lost="a full disk")
+    decided = [replace(job, phase=phase, why=why, due=True) for job in doubts]
+    cell.take(DecidedByPerson(verdict, "a"))
+    assert (cell.memory.jobs, cell.memory.lost) == ((decided[0], doubts[1]), "a full disk")
+    cell.take(DecidedByPerson(verdict, ""))
+    assert (cell.memory.jobs, cell.memory.lost) == (tuple(decided), "")
+    assert cell.refused == ""
+
+
+def test_a_machine_that_stops_or_reports_a_fault_fails_with_the_reason() -> None:
+    cell = running().take(Sampled(replace(WORKS, errors=("a jam", "an open lid"))), at=10.5)
+    why = "it reports a fault: a jam; an open lid"
+    assert (cell.memory.jobs[0].why, cell.memory.halted) == (why, f"task has failed: {why}")
+    cell = running().take(Sampled(WORKS), at=10.5).take(Sampled(CALM), at=11.0)
+    assert cell.take(Sampled(CALM), at=11.75).memory.cycle is not None
+    assert cell.take(Sampled(CALM), at=12.0).memory.cycle is None
+    assert cell.memory.jobs[0].why == "it has stopped, and done did not come within 1 s"
+
+
+def test_a_finished_request_is_closed_after_silence_and_forgotten_after_a_day() -> None:
+    phases: tuple[Any, ...] = ("done", "queued", "running", "failed", "doubtful")
+    jobs = tuple(Job(phase, BOX, phase=phase, asked_at=0.0, due=True) for phase in phases)
+    cell = Cell().take(Sampled(CALM), at=0.0)
+    cell.memory = replace(cell.memory, jobs=jobs)
+    closed = {"done": True, "failed": True}
+    for now, known in ((299.5, phases), (300.0, phases), (86_400.0, ("running", "doubtful"))):
+        cell.take(MemoryKept(), at=now)
+        assert [job.guid for job in cell.memory.jobs] == [*known]
+        assert [(job.closed, job.due) for job in cell.memory.jobs] == [
+            (now >= 300.0 and closed.get(guid, False), now < 300.0 or guid not in closed)
+            for guid in known
+        ]
+
+
+def test_the_core_wakes_for_each_of_its_time_limits() -> None:
+    contact = Settled(value=False, candidate=True, since=10.25, torn_since=10.0)
+    steady = Settled(value=False, candidate=False, since=1.0, steady_at=1.0)
+    memory = WorkcellMemory(
+        jobs=(
+            Job("a", phase="done", asked_at=20.0),
+            Job("b", phase="failed", asked_at=30.0, closed=True),
+            Job("c", phase="queued", asked_at=40.0),
+            Job("d", phase="done"),
+        ),
+        cycle=Cycle("c", 100.0, rested_at=200.0),
+        senses=WorkcellSenses(steady, steady, contact, contact, read_at=11.0),
+        rival_at=50.0,
+    )
+    limits = replace(PULSED, debounce={"ready": 0.5})
+    assert sorted(at for at in changes(memory, limits) if at < NEVER) == [
+        10.25,  # the fault contact, without a debounce
+        10.75,  # ready
+        12.0,  # the reading is stale
+        55.0,  # the rival is gone
+        100.5,  # the pulse ends
+        160.0,  # the cycle's time is over
+        201.0,  # done has not come
+        320.0,  # request a is closed
+    ]
