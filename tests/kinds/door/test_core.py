@@ -5,11 +5,13 @@ import math
 import pytest
 from msgspec.structs import replace
 
+from bridges.kinds.door.core import repeated
 from bridges.kinds.door.memory import DoorLimits
 from bridges.kinds.door.report import DoorReport
 from bridges.kinds.door.settings import DoorDurations, Pulse
 from bridges.kinds.door.signals import DoorOutputs, DoorSample, Event
 from bridges.kinds.shared.decision import (
+    AlarmInputs,
     Fault,
     IoFailed,
     OperatorReset,
@@ -547,3 +549,42 @@ def test_an_unchanged_reading_is_no_news() -> None:
     before, after = core.sees(OPEN, until=1.0).report, core.sees(OPEN, until=2.0).report
     assert (before.read_at, after.read_at) == (1.0, 2.0)
     assert before.news() == after.news()
+
+
+def test_the_same_reading_once_more_changes_only_the_time_of_the_reading() -> None:
+    core = CoreAlone()
+    core.sees(OPEN, until=1.0)
+    again = repeated(core.memory, 1.125)
+    assert again == replace(core.memory, senses=replace(core.memory.senses, read_at=1.125))
+    assert again != core.memory
+
+
+# ---- the report
+
+
+def test_a_request_that_waits_has_a_reason_until_the_door_is_open() -> None:
+    core = CoreAlone()
+    reasons = [core.hears(OPENS).report.waits]
+    reasons.append(core.hears(Sampled(CLOSED)).report.waits)
+    reasons.append(core.sees(CLOSED, until=1.0).report.waits)
+    reasons.append(core.hears(RivalSeen()).report.waits)
+    reasons.append(core.sees(OPEN, until=8.0).report.waits)
+    assert reasons == [
+        "for a reading",
+        "for its contacts to be steady",
+        "for the door to open",
+        "until no other node publishes its states",
+        "",
+    ]
+
+
+def test_the_fleets_alarm_gets_the_doors_fire_contact_once_it_is_steady() -> None:
+    core = CoreAlone()
+    alarms = [core.hears(Sampled(replace(OPEN, fire=False))).report.alarm]
+    alarms.append(core.sees(replace(OPEN, fire=False), until=1.0).report.alarm)
+    alarms.append(core.sees(replace(OPEN, fire=True), until=2.0).report.alarm)
+    assert alarms == [
+        AlarmInputs(frozenset(), False),
+        AlarmInputs(frozenset(), True),
+        AlarmInputs(frozenset({"fire"}), True),
+    ]
