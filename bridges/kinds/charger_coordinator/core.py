@@ -126,5 +126,5 @@ def _wake_at(memory: SiteMemory, now: float, site: SiteLimits) -> float:
             due.append(stations.not_taken_at(grant))
     due += [stations.proven_at(memory, who) for who in memory.strikes]
     due += report.due(memory, site)
-    due += wrong_pad.due(memory, now, site)
+    due += wrong_pad.due(memory, site)
     return min((at for at in due if at > now), default=NEVER)

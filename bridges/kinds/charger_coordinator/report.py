@@ -93,7 +93,7 @@ def report(memory: SiteMemory, now: float, site: SiteLimits) -> SiteReport:
     waiting = queued(memory)
     return SiteReport(
         read_at=max((seen.at for seen in memory.stations.values()), default=None),
-        stations=tuple((name, _of(memory, name, now)) for name in site.places),
+        stations=tuple((name, _of(memory, name)) for name in site.places),
         queue=tuple(reasons(memory, now, site)),
         waiting=tuple(wish.robot for wish in waiting),
         assigns=_assigns(memory),
@@ -109,7 +109,7 @@ def _assigns(memory: SiteMemory) -> str:
     return "no: another node publishes charging_assignments"
 
 
-def _of(memory: SiteMemory, name: str, now: float) -> str:
+def _of(memory: SiteMemory, name: str) -> str:
     """Describe a station: `CHARGING fleet/robot, by the schedule`, or `IDLE`. Before the first state
     the text is `?`."""
     seen, grant = memory.stations.get(name), memory.grants.get(name)

@@ -87,7 +87,7 @@ def alarming(memory: SiteMemory, one: OnWrongPad, now: float) -> bool:
     return now >= max(one.since, _alarm_at(memory, one))
 
 
-def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
+def due(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
     """Yield the times of the next orders and alerts."""
     for nudge in memory.nudges.values():
         yield nudge.at + TOLD_S

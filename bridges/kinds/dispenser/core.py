@@ -121,7 +121,7 @@ def _hear(memory: WorkcellMemory, event: Event, now: float, limits: WorkcellLimi
         case MemoryNotKept(reason):
             return replace(memory, not_kept=reason), ""
         case DecidedByPerson():
-            return _judge(memory, event, now)
+            return _judge(memory, event)
         case ItemRequested():
             return _ask(memory, event, now, limits)
 
@@ -180,7 +180,7 @@ def _put(memory: WorkcellMemory, changed: Job) -> WorkcellMemory:
     return replace(memory, jobs=tuple(jobs))
 
 
-def _judge(memory: WorkcellMemory, said: DecidedByPerson, now: float) -> Heard:
+def _judge(memory: WorkcellMemory, said: DecidedByPerson) -> Heard:
     """Apply a person's decision on the outcome of one request in doubt, or of all requests in doubt."""
     named = [job for job in memory.doubtful() if said.request in ("", job.guid)]
     if not named and (said.request or not memory.lost):

@@ -162,7 +162,7 @@ def test_the_core_wakes_for_every_step_with_a_robot_astray() -> None:
     dues = []
     for now in (21.0, 22.0, 37.0):
         memory = wrong_pad.nudged(memory, now, SITE)
-        dues.append(sorted(wrong_pad.due(memory, now, SITE)))
+        dues.append(sorted(wrong_pad.due(memory, SITE)))
     assert dues == [[22.0, 22.0, NEVER], [22.0, 23.0, 37.0, NEVER], [22.0, 38.0, 52.0, NEVER]]
 
 
@@ -246,7 +246,7 @@ def test_a_blocking_robot_is_nudged_once_and_then_a_person_is_told() -> None:
         (110.0, told, False, True),
     ]
     memory = wrong_pad.nudged(memory, 90.0, SITE)
-    assert sorted(wrong_pad.due(memory, 90.0, SITE)) == [90.0, 91.0, 105.0, NEVER]
+    assert sorted(wrong_pad.due(memory, SITE)) == [90.0, 91.0, 105.0, NEVER]
     for place in (None, "wait_2"):
         gone = replace(memory, robots={TWO: at(TWO, place, 95.0)})
         assert wrong_pad.nudged(gone, 96.0, SITE).nudges == {}
