@@ -144,6 +144,7 @@ def test_a_cycle_that_rmf_gave_up_before_its_start_was_on_disk_waits_again() -> 
     cell.take(Sampled(CALM), at=15.0).take(MemoryKept())
     assert (cell.outputs, cell.memory.cycle, cell.faults) == (WorkcellOutputs(), None, [])
     assert cell.report.queue == ("task",)
+    assert [(job.phase, job.kept) for job in cell.memory.jobs] == [("queued", "running")]
     cell.take(ASKS, MemoryKept(), MemoryKept())
     assert cell.outputs == ON
 
@@ -193,6 +194,14 @@ def test_no_event_but_a_wrong_request_or_decision_is_refused() -> None:
     assert nothing.refused == "nothing in doubt: no request waits for a decision"
     other = asked().take(replace(ASKS, item=Item("jar", 1)))
     assert other.refused == "guid of another request: task is for 1 box"
+
+
+def test_a_queue_of_a_hundred_requests_that_are_not_done_is_full() -> None:
+    for phase, refused in (("done", ""), ("failed", "queue is full: 100 requests are not done")):
+        jobs = tuple(Job(f"t{n}", phase=phase) for n in range(100))
+        cell = Cell().take(Sampled(CALM), at=10.0)
+        cell.memory = replace(cell.memory, jobs=jobs)
+        assert cell.take(ASKS).refused == refused
 
 
 def test_a_failure_halts_until_a_reset_and_no_longer() -> None:
