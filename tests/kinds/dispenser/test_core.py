@@ -197,7 +197,11 @@ def test_no_event_but_a_wrong_request_or_decision_is_refused() -> None:
 
 
 def test_a_queue_of_a_hundred_requests_that_are_not_done_is_full() -> None:
-    for phase, refused in (("done", ""), ("failed", "queue is full: 100 requests are not done")):
+    cases: list[tuple[Any, str]] = [
+        ("done", ""),
+        ("failed", "queue is full: 100 requests are not done"),
+    ]
+    for phase, refused in cases:
         jobs = tuple(Job(f"t{n}", phase=phase) for n in range(100))
         cell = Cell().take(Sampled(CALM), at=10.0)
         cell.memory = replace(cell.memory, jobs=jobs)
