@@ -47,7 +47,7 @@ class ClearedCalls:
         self._told: set[str] = set()
 
     def wrote(self, name: str) -> None:
-        """Record a write."""
+        """Record a write. The reply to the write has come just now."""
         self._written_at[name] = self._now()
         self._stayed.discard(name)
         self._gone.discard(name)
@@ -58,14 +58,18 @@ class ClearedCalls:
         cleared = name not in self._stayed and found == self._without_call(name, written)
         return found == written or cleared
 
-    def keeps(self, name: str, written: int, found: int) -> bool:
+    def keeps(self, name: str, written: int, found: int, asked_at: float) -> bool:
         """Return False if the driver must write the call again. The reading `found` must fit
-        (`may_read`)."""
+        (`may_read`). The request for it was sent at `asked_at`.
+
+        A call has stayed for a scan if a whole scan lies between the reply to its write and that
+        request. On a slow line both take long, and the controller may clear the call between them.
+        """
         habits = self._clearing.get(name)
         if habits is None or habits.pulse or self._without_call(name, written) == written:
             return True
         if found == written:
-            if self._now() - self._written_at.get(name, 0.0) >= self._scan_s:
+            if asked_at - self._written_at.get(name, 0.0) >= self._scan_s:
                 self._stayed.add(name)
                 self._in_a_row.pop(name, None)
             return True

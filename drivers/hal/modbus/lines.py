@@ -130,12 +130,13 @@ class ModbusLines:
         """
         known, self._set = self._set, {}
         self._guard.check()
+        asked_at = self._units.now()
         image = self._all.read()
         if self._verified == (known, image):
             self._set = known
             return self._levels
         self._verify(known, image)
-        lost = self._lost(known, image)
+        lost = self._lost(known, image, asked_at)
         self._set = {name: value for name, value in known.items() if name not in lost}
         self._levels = {**lost, **{n: p.of(image[p.cell]) for n, p in self._inputs.items()}}
         self._verified = None if self._clearing else (dict(known), image)
@@ -197,8 +198,8 @@ class ModbusLines:
                 with every.one():
                     if name not in safe:
                         self._rivals.check([str(self._outputs[name])])
-                    self._calls.wrote(name)
                     self._units.write(self._outputs[name], values[name], safe=name in safe)
+                    self._calls.wrote(name)
                     written[name] = values[name]
         self._read_back(written, safe=len(safe) == len(values), every=every)
 
@@ -224,13 +225,16 @@ class ModbusLines:
         `image` lacks the output, or if the output cannot be read back (`unread`)."""
         return value if name in self._unread else image.get(self._outputs[name], value)
 
-    def _lost(self, known: Mapping[str, int], image: Mapping[Point, int]) -> dict[str, int]:
+    def _lost(
+        self, known: Mapping[str, int], image: Mapping[Point, int], asked_at: float
+    ) -> dict[str, int]:
         """Return the reading of each output whose call has disappeared. The driver must write these
-        calls again."""
+        calls again. `asked_at`: the time when the request for `image` was sent."""
         lost: dict[str, int] = {}
         for name, value in known.items():
             point = self._outputs[name]
-            if not self._calls.keeps(name, value, self._reading(name, value, image)):
+            reading = self._reading(name, value, image)
+            if not self._calls.keeps(name, value, reading, asked_at):
                 lost[name] = image[point]
             self._calls.tell(name, str(point))
         return lost
