@@ -252,7 +252,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
 
     def station_of(self, robot: RobotName) -> str | None:
         """Find this robot's station; None if the robot has no station."""
-        return next((s for s, g in self.grants.items() if g.robot == robot and not g.over), None)
+        return self.allotted.get(robot)
 
     def place_of(self, robot: RobotName) -> str | None:
         """Return the waypoint of our YAML where the fleet last saw the robot; None for a robot
@@ -272,9 +272,9 @@ class SiteMemory(msgspec.Struct, frozen=True):
 
     @property
     def places(self) -> Mapping[RobotName, str | None]:
-        """The waypoint of every robot that its fleet has reported, now or before our restart; see
-        `place_of`."""
-        return {**self.stood, **{who: seen.sighting.place for who, seen in self.robots.items()}}
+        """The place (`place_of`) of every robot that its fleet has reported, now or before our
+        restart."""
+        return {who: self.place_of(who) for who in {**self.stood, **self.robots}}
 
     @property
     def allotted(self) -> Mapping[RobotName, str]:
