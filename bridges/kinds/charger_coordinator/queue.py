@@ -43,13 +43,13 @@ Here = Mapping[str, Sequence[RobotName]]
 
 def allot(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Give the free stations to the waiting robots, in the order of the queue."""
-    here = standing(memory, site)
-    for wish in memory.wishes:
-        if memory.station_of(wish.robot) is None:
-            stations = suiting(memory, wish, site)
-            station = next((s for s in stations if _free(memory, s, wish.robot, now, here)), None)
-            if station is not None:
-                memory = _granted(memory, wish, station, now, site)
+    waiting = queued(memory)
+    here = standing(memory, site) if waiting else {}
+    for wish in waiting:
+        stations = suiting(memory, wish, site)
+        station = next((s for s in stations if _free(memory, s, wish.robot, now, here)), None)
+        if station is not None:
+            memory = _granted(memory, wish, station, now, site)
     return memory
 
 

@@ -28,8 +28,9 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
     """Yield a text for each waiting robot, such as `tiny/AMR03 by the robot: charger_b charges
     tiny/AMR01, free in 12 min`."""
     taken: set[str] = set()
-    here = standing(memory, site)
-    for wish in queued(memory):
+    waiting = queued(memory)
+    here = standing(memory, site) if waiting else {}
+    for wish in waiting:
         stations = suiting(memory, wish, site)
         left = [name for name in stations if name not in taken]
         first = min(left, key=lambda name: free_in_s(memory, name, now), default=None)

@@ -126,9 +126,10 @@ def _stands(
 
 def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
     """Yield robots without a station that stand on a pad for which another robot waits."""
-    here = standing(memory, site)
+    waiting = queued(memory)
+    here = standing(memory, site) if waiting else {}
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
-    for wish in queued(memory) if idle else ():
+    for wish in waiting if idle else ():
         for name in suiting(memory, wish, site):
             who, seen = idle.get(name), memory.stations.get(name)
             if who is None or who == wish.robot or seen is None:
