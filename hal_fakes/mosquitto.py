@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+import paho.mqtt.client as paho
+
 from drivers.hal import HalError
 
 READY_S: Final = 15.0
@@ -87,6 +89,16 @@ class Mosquitto:
         """End the broker. The caller may call `close` twice."""
         self.kill()
         self._folder.cleanup()
+
+
+def end(client: paho.Client) -> None:
+    """End the thread of a client that has left its broker, and close the client.
+
+    `loop_stop` leaves the two sockets open that wake the thread (paho-mqtt 2.2). The garbage collector
+    would close them at a random later time, with a warning.
+    """
+    client.loop_stop()
+    client.reinitialise()
 
 
 def _free_port() -> int:

@@ -27,7 +27,7 @@ from drivers.hal.mqtt.points import MqttPoint
 from drivers.hal.points import HalError
 from hal_fakes.fake import Outside
 from hal_fakes.json_answers import put
-from hal_fakes.mosquitto import Mosquitto
+from hal_fakes.mosquitto import Mosquitto, end
 from hal_fakes.plants.plant import FailureMode, Plant
 from hal_fakes.vda5050 import FakeVdaRobot
 from hal_fakes.vda_site import VdaSite
@@ -196,7 +196,7 @@ class MqttSite:
 
     def _detach(self) -> None:
         self._client.disconnect()
-        self._client.loop_stop()
+        end(self._client)
 
     def _take(self, client: object, _: object, message: paho.MQTTMessage) -> None:
         topic, payload = message.topic, message.payload.decode()

@@ -26,6 +26,7 @@ from drivers.fleet.vda5050 import VdaRobotSettings
 from drivers.fleet.vda_messages import DIALECTS, Json
 from drivers.hal.timestamps import utc
 from hal_fakes.fake import Fake
+from hal_fakes.mosquitto import end
 from hal_fakes.plants import robot
 from hal_fakes.plants.plant import Plant
 from hal_fakes.plants.robot import RobotOrder, RobotSeen
@@ -81,7 +82,7 @@ class FakeVdaRobot:
             sock = client.socket()
             if sock is not None:
                 sock.close()
-            client.loop_stop()
+            end(client)
 
     def tick(self, now: float) -> None:
         """Let the robot move, and publish what is due."""

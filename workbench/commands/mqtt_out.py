@@ -221,6 +221,7 @@ class Broker:
                 self._client.publish(self._status, "offline", 1, True).wait_for_publish(LEAVES_S)
         self._client.disconnect()
         self._client.loop_stop()
+        self._client.reinitialise()  # closes the sockets that loop_stop leaves open
 
     def _connected(
         self, client: "Client", userdata: Any, flags: Any, reason: Any, more: Any

@@ -212,6 +212,11 @@ class Link(threading.Thread):
         self._client.loop_write()
         if (sock := self._client.socket()) is not None:
             sock.close()  # close anyway, because a broker may never read DISCONNECT
+        # The client closes the sockets that wake this thread only when nobody refers to it any more. So
+        # it may not refer to the link, or both would wait for the garbage collector.
+        client = self._client
+        client.on_connect = client.on_subscribe = client.on_message = None
+        client.on_publish = client.on_disconnect = None
         self.on_end()
 
     def _explained(self, error: OSError) -> str:

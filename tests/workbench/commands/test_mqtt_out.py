@@ -20,7 +20,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.transports.choose import open_transport
 from bridges.transports.transport import TransportError
-from hal_fakes.mosquitto import Mosquitto
+from hal_fakes.mosquitto import Mosquitto, end
 from hal_fakes.wire import runs_here
 from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
@@ -50,7 +50,7 @@ class Reader:
 
     def close(self) -> None:
         self._client.disconnect()
-        self._client.loop_stop()
+        end(self._client)
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from drivers.hal import HalError
 from drivers.hal.mqtt import MqttBus, MqttSettings
+from hal_fakes.mosquitto import end
 from tests.waiting import wait_until
 
 STATE, SWITCH = "relay/state", "relay/set"
@@ -71,7 +72,7 @@ class FarDevice:
     def close(self) -> None:
         """Disconnect from the broker."""
         self.client.disconnect()
-        self.client.loop_stop()
+        end(self.client)
 
 
 def reason(bus: MqttBus, topic: str, stale_after_s: float = 60.0) -> str:

@@ -1,6 +1,8 @@
 """The `mqtt` bus with a real broker, which the tests kill, freeze and restart."""
 
+import gc
 import itertools
+import os
 import socket
 import subprocess
 import sys
@@ -237,6 +239,34 @@ def test_what_an_ended_connection_still_delivers_is_dropped() -> None:
     link.close()
     link._on_message(None, None, message)
     assert taken == [STATE]
+
+
+def test_a_flapping_broker_leaves_no_file_open(broker: Mosquitto) -> None:
+    """The garbage collector may come only after the last free descriptor is in use."""
+
+    def answers() -> bool:
+        bus.insist()
+        try:
+            return bus.up() is not None
+        except HalError:
+            return False
+
+    def files() -> int:
+        return len(os.listdir("/proc/self/fd"))
+
+    gc.disable()
+    try:
+        with bus_to(broker.port) as bus:
+            assert answers()
+            before = files()
+            for _ in range(5):
+                broker.kill()
+                wait_until(lambda: not answers(), "the broker is missed")
+                broker.start()
+                wait_until(answers, "the broker is back")
+            wait_until(lambda: files() == before, "no file of an earlier connection is open")
+    finally:
+        gc.enable()
 
 
 def test_a_connection_is_without_delay(broker: Mosquitto) -> None:
