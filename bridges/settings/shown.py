@@ -79,7 +79,7 @@ def _unit(info: mi.Type) -> str:
 
 def _text(value: object, unit: str) -> str:
     value = getattr(value, "value", value)
-    if value is None or value in ([], {}):
+    if value is None or value in ([], (), {}):
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -158,7 +158,10 @@ def test_shipped_files_exist() -> None:
 
 def test_a_shipped_file_is_correct_and_has_wires_or_addresses(config: Path) -> None:
     loaded = load(config)
-    shown = lines(findings(loaded), 130)
+    found = findings(loaded)
+    rows = [row for p in found.parts for t in p.tables if t.title == "settings" for row in t.rows]
+    assert [setting for setting, value, _ in rows if not value] == [], "a setting without a value"
+    shown = lines(found, 130)
     assert len(shown) > 4
     assert max(map(len, shown)) <= 130
     assert loaded.text == config.read_bytes()
