@@ -216,6 +216,7 @@ class RmfsSupervisor:
         self._says = list(says)
         self._place: Place
         air.best_effort.add(name)
+        air.unrepeated.add(name)
 
     def start(self) -> None:
         """Start a new supervisor. It remembers nothing, and hears all retained messages."""

@@ -4,8 +4,9 @@ The network keeps the guarantees of the QoS RELIABLE and KEEP_LAST. A reader get
 writer in order. If the network must send a sample twice, the sample arrives late.
 
 On real sites RMF's own readers of states are best effort (Fast DDS). So here these readers lose some
-samples. The network is harsher than DDS, because all other readers lose a few samples too. A few
-samples also come twice.
+samples. The network is harsher than DDS, because all other readers lose a few samples too. Only what
+RMF's supervisors publish is never lost: they do not repeat an OPEN for a door that is still open, and
+rely on RELIABLE. A few samples also come twice.
 
 A node that is cut off for less than a lease gets all samples afterwards in one burst. A node that is
 cut off for longer loses all samples of that time. Afterwards it gets the messages that other nodes
@@ -54,7 +55,8 @@ NameOf = Callable[[Any], str]
 
 class Air:
     """The network between the nodes. Nodes in `best_effort` lose more states than other nodes do, as
-    RMF's nodes do. `watch` gets all samples.
+    RMF's nodes do. The samples of nodes in `unrepeated` are late in place of lost. `watch` gets all
+    samples.
 
     With `sorts`, a node gets no message that it would drop unread: a device gets only messages that
     name it (`Place.subscribe_to`), and a robot only states that it `heeds`. In a hospital with 200
@@ -66,6 +68,7 @@ class Air:
         self.memory = MemoryNetwork()
         self.weather = Weather()
         self.best_effort: set[str] = set()
+        self.unrepeated: set[str] = set()
         self.watch: Watch = lambda speaker, topic, message: None
         self.speaker = RETAINED
         self.release = NEWEST
@@ -96,6 +99,8 @@ class Air:
         lost = weather.lost
         if hearer in self.best_effort and topic.name in STATES:
             lost += weather.states_lost
+        if draw < lost and speaker in self.unrepeated:
+            return (delay + weather.latest_s,)
         if draw < lost:
             return ()
         if draw > 1.0 - weather.late:

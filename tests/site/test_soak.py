@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 
 from bridges.kinds.lift import forgotten
-from bridges.messages.topics import LIFT_STATES, Topic
+from bridges.messages.topics import DOOR_REQUESTS, LIFT_STATES, Topic
 from tests.depth import depth
 from tests.site.building import hospital
-from tests.site.daemons import DeviceDaemon
+from tests.site.daemons import DeviceDaemon, rmfs_door_supervisor
 from tests.site.day import Site
 from tests.site.growth import Look, growth
 from tests.site.laws import Broken, Laws
@@ -52,6 +52,16 @@ def test_nodes_that_were_once_cut_off_hear_each_other_as_late_as_before() -> Non
     delays = [d for _ in range(500) for d in air.delays("lift", "supervisor", LIFT_STATES)]
     assert min(delays) >= 0.002
     assert max(delays) > 0.5
+
+
+def test_what_rmfs_supervisors_say_once_is_late_but_never_lost() -> None:
+    timeline = Timeline()
+    air = Air(timeline, Random(1))
+    rmfs_door_supervisor(timeline, air)
+    sent = [air.delays("rmf_door_supervisor", "door", DOOR_REQUESTS) for _ in range(2000)]
+    assert min(len(copies) for copies in sent) == 1
+    assert max(max(copies) for copies in sent) >= air.weather.latest_s
+    assert () in [air.delays("door_supervisor", "door", DOOR_REQUESTS) for _ in range(2000)]
 
 
 @pytest.mark.long(3)
