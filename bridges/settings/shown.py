@@ -81,6 +81,8 @@ def _text(value: object, unit: str) -> str:
     value = getattr(value, "value", value)
     if value is None or value in ([], (), {}):
         return "-"
+    if value == "":
+        return '""'
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
