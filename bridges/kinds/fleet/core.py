@@ -11,9 +11,10 @@ FLEET-2. A command is done when the robot is within `arrived_m` of the goal, on 
    the command is not done, and the report is a fault.
 FLEET-3. If the robot stands for `obeys_s` and the command is not done, the command is sent again. The
    pauses between attempts grow. An action is sent again only if its manager refused it, because an
-   action must not be done twice.
-FLEET-4. After a stop or pause, the robot must be seen to stand. Until then the command is sent again
-   every `stops_s`. A new order replaces a stop.
+   action must not be done twice. No command is sent again while the robot is paused, takes no orders or
+   reports a fault, because a person may be keeping it there.
+FLEET-4. After a stop or pause was sent, the robot must be seen to stand. Until then the command is sent
+   again every `stops_s`, also to a robot that is not read. A new order replaces a stop.
 FLEET-5. RMF gets the robot's place only from a fresh reading. After `stale_after_s` without a reading
    the robot is silent.
 FLEET-6. If the robot is on a map that the graph lacks, RMF gets no place. If the robot is on the map
@@ -29,7 +30,8 @@ FLEET-10. A robot gets no new task while it reports a fault, takes no orders, is
    unknown map, or has not carried out a command after `attempts` attempts. When this is over, the robot
    gets tasks again.
 FLEET-11. If RMF has given up an activity, the activity is stopped.
-FLEET-12. After an operator's reset, the attempts are counted from the beginning.
+FLEET-12. After an operator's reset, the attempts are counted from the beginning, and the command is
+   sent again. An action is sent again only if it was refused, or if nobody knows whether it has begun.
 
 `light.py` has the rules for a robot that RMF can only pause.
 """
@@ -103,11 +105,22 @@ def _hear(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) ->
         case OperatorReset():
             paused = limits.light and memory.reading is not None and memory.reading.paused is True
             held = replace(memory.light, held=memory.light.held or paused)
-            memory = replace(memory, light=held)
-            return replace(_again(memory, now), tries=1) if memory.command else memory
+            return _reset(replace(memory, light=held), now)
         case Navigate() | Localize() | Act() | Stop():
             return _order(memory, event, now, limits)
     return memory
+
+
+def _reset(memory: RobotMemory, now: float) -> RobotMemory:
+    """Send the command again at once, after an operator's reset. An action that may have begun is not
+    sent again: the reset may be for another robot of the file."""
+    if memory.command is None:
+        return memory
+    reading = memory.reading
+    lost = reading is not None and (reading.refused or reading.unanswered)
+    if memory.command.doing == "act" and not lost:
+        return replace(memory, tries=1)
+    return replace(_again(memory, now), tries=1)
 
 
 def _order(
@@ -143,21 +156,29 @@ def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemor
     """Clear the command if the robot has carried it out. Otherwise begin the next attempt if its time
     has come."""
     command = memory.command
-    if command is None or not memory.fresh:
+    if command is None:
         return memory
     if command.doing in ("stop", "pause"):
-        assert memory.reading is not None
-        if stands(memory, now) and not (
-            command.doing == "pause" and memory.reading.paused is False
-        ):
+        if _has_stopped(memory, command, now):
             return replace(memory, command=None)
         return _again(memory, now) if now >= memory.asked_at + limits.t.stops_s else memory
+    if not memory.fresh:
+        return memory
     if command.doing == "resume" and light.resumed(memory, now, limits):
         return replace(memory, command=None, light=replace(memory.light, held=False))
     memory = _arrival(memory, command, now, limits)
     if command.doing != "resume" and _is_done(memory, command, now, limits):
         return replace(memory, command=None, finished=command.id, arrived_at=None)
     return _again(memory, now) if now >= _again_at(memory, command, now, limits) else memory
+
+
+def _has_stopped(memory: RobotMemory, command: RobotCommand, now: float) -> bool:
+    """Return whether the robot was seen to stand after the stop or pause was sent. A robot that stood
+    before it may just have taken the command that must be stopped."""
+    if not memory.fresh or memory.reading is None or memory.read_at is None:
+        return False
+    not_paused = command.doing == "pause" and memory.reading.paused is False
+    return memory.read_at > memory.asked_at and stands(memory, now) and not not_paused
 
 
 def _again(memory: RobotMemory, now: float) -> RobotMemory:
@@ -202,11 +223,16 @@ def _is_there(memory: RobotMemory, command: RobotCommand, now: float, limits: Ro
 
 
 def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> float:
-    """Return the time of the next attempt; NEVER while the robot moves."""
+    """Return the time of the next attempt. Return NEVER while the robot moves, and while a person or
+    the robot itself keeps it standing."""
     assert memory.reading is not None
+    reading = memory.reading
+    kept = reading.paused is True or bool(reading.taken_out or reading.fault)
+    if kept and command.doing != "resume":
+        return NEVER
     if memory.arrived_at is not None:
         return memory.arrived_at + limits.t.docks_s
-    waits = memory.reading.refused if command.doing == "act" else stands(memory, now)
+    waits = reading.refused if command.doing == "act" else stands(memory, now)
     pause_s = limits.t.obeys_s * min(memory.tries, MOST_PAUSES)
     since = memory.asked_at if command.doing == "act" else max(memory.asked_at, memory.moved_at)
     return since + pause_s if waits else NEVER

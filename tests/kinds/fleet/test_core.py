@@ -1,5 +1,9 @@
 """When the core sends, completes, repeats and stops a robot's commands (FLEET-1 to FLEET-4)."""
 
+from typing import Any
+
+import pytest
+
 from bridges.kinds.fleet.signals import Act, Navigate, Stop
 from bridges.kinds.shared.decision import Fault, OperatorReset
 from tests.kinds.fleet.story import PANTRY, SCAN_S, Story, at, driving, goal
@@ -152,6 +156,37 @@ def test_a_robot_that_drives_on_is_stopped_again() -> None:  # FLEET-4
     assert story.faults == ["ROBOT_NOT_STOPPING"]
     story.see(4.0)
     assert story.faults == ["ROBOT_NOT_OBEYING"]
+
+
+def test_a_robot_that_has_not_moved_off_yet_is_stopped_too() -> None:  # FLEET-4, FLEET-11
+    """It stood before the stop, but the command that is stopped may already be on its way."""
+    story = driving(7, moving=False).see(0.5).order(Stop(8, of=7))
+    assert story.commands[-1] == (0.5, "stop 8, attempt 1")
+    story.see(SCAN_S)
+    assert story.commands[-1] == (0.625, "none")
+
+
+def test_a_stop_is_sent_again_to_a_robot_that_is_not_read() -> None:  # FLEET-4
+    story = driving(7, moving=True).order(Stop(8, of=7)).silence(7.0)
+    assert story.commands[-1] == (6.0, "stop 8, attempt 3")
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [{"paused": True}, {"taken_out": "manual mode"}, {"fault": "emergency stop"}],
+    ids=lambda kept: str(next(iter(kept))),
+)
+def test_a_robot_that_a_person_keeps_standing_is_not_sent_off_again(kept: dict[str, Any]) -> None:
+    """FLEET-3."""
+    story = driving(7, moving=False).see(100.0, **kept)
+    assert story.commands == [(0.0, "navigate 7, attempt 1")]
+    story.see(1.0, paused=False, taken_out="", fault="")
+    assert story.commands[-1] == (100.0, "navigate 7, attempt 2")
+
+
+def test_a_reset_for_another_robot_repeats_no_action() -> None:  # FLEET-12
+    story = Story().see(completed="").order(Act(9, "clean")).see(20.0).take(OperatorReset())
+    assert story.commands == [(0.0, "act 9, attempt 1")]
 
 
 def test_a_stop_without_a_word_about_motion_is_believed_after_a_second_of_standing() -> None:

@@ -13,7 +13,7 @@ from bridges.kinds.fleet.keep import KEEPING
 from bridges.kinds.fleet.light import LightQuestion
 from bridges.kinds.fleet.signals import LightAnswer, Pose, RobotSample, Says
 from bridges.kinds.shared.decision import Fault, OperatorReset
-from tests.kinds.fleet.story import LIMITS, SITE, Story, at
+from tests.kinds.fleet.story import LIMITS, SCAN_S, SITE, Story, at
 
 LIGHT = replace(LIMITS, light=True)
 PATH = (at(3.0), at(6.0), at(9.0))
@@ -109,8 +109,8 @@ def test_a_path_over_a_lift_goes_on_at_the_other_floor() -> None:
 def test_without_an_answer_it_is_paused() -> None:  # FLEET-LIGHT-2
     story = standing(moving=True)
     assert story.commands == [(0.0, "pause 1, attempt 1")]
-    story.see(moving=False, paused=True)
-    assert story.commands[-1] == (0.0, "none")
+    story.see(SCAN_S, moving=False, paused=True)
+    assert story.commands[-1] == (SCAN_S, "none")
 
 
 def test_it_is_paused_before_the_checkpoint_where_it_must_wait() -> None:  # FLEET-LIGHT-2
@@ -178,7 +178,7 @@ def test_a_robot_that_does_not_pause_is_told_again_and_the_fault_said() -> None:
 
 
 def test_a_robot_that_drives_on_against_a_pause_is_paused_again() -> None:  # FLEET-LIGHT-2
-    story = standing().see(paused=True).see(paused=False, moving=True)
+    story = standing().see(SCAN_S, paused=True).see(paused=False, moving=True)
     assert story.commands[-1][1] == "pause 2, attempt 1"
 
 
@@ -207,7 +207,7 @@ def test_a_robot_that_stands_before_a_granted_checkpoint_counts_as_there() -> No
 
 
 def test_a_checkpoint_that_was_not_granted_is_not_reported() -> None:  # FLEET-LIGHT-3
-    story = standing(path=(at(0.8), at(6.0))).see(paused=True)
+    story = standing(path=(at(0.8), at(6.0))).see(SCAN_S, paused=True)
     assert asked(story) == (1, 0, "at")
     says(story, "resume", 0).see()
     assert asked(story) == (1, 1, "at")
@@ -272,7 +272,7 @@ def test_its_doing_names_path_checkpoint_light_and_pause() -> None:
     story = standing(moving=True)
     way = "path to L1 lift1_L1, at checkpoint 0 of 3, RMF's light: "
     assert story.report.doing == way + "no answer, told to pause"
-    story.see(moving=False, paused=True)
+    story.see(SCAN_S, moving=False, paused=True)
     assert story.report.doing == way + "no answer, paused by us"
     says(says(story, "resume", 0).see(paused=False, moving=True), "continue", 0)
     assert story.report.doing == way + "continue"
