@@ -135,15 +135,15 @@ def _kept(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workcel
     """Note that the phases of all requests are on disk. The time of a new cycle counts from now,
     because its output `start` comes on only now.
 
-    If RMF has stopped repeating the request in the meantime, the cycle does not start, and the request
-    is queued again.
+    The disk may have taken long. If RMF has stopped repeating the request in the meantime, or if
+    something forbids the start now, the cycle does not start, and the request is queued again.
     """
     jobs = tuple(replace(job, kept=job.phase) for job in memory.jobs)
     cycle, kept = memory.cycle, replace(memory, jobs=jobs, not_kept="")
     before = memory.job(cycle.guid) if cycle else None
     if cycle is None or before is None or before.kept == "running":
         return kept
-    if not _is_asked(before, now, limits):
+    if not (_is_asked(before, now, limits) and _may_start(kept, now, limits)):
         waits = replace(before, phase="queued", kept="running")
         return replace(_put(kept, waits), cycle=None)
     return replace(kept, cycle=replace(cycle, started_at=now))
@@ -220,9 +220,10 @@ def _watch(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workce
 
 
 def _end(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """End the cycle if the inputs show its end, or if its time is over."""
+    """End the cycle if the inputs show its end, or if its time is over. A cycle that is not on disk has
+    not begun."""
     cycle, job, senses, t = memory.cycle, memory.running(), memory.senses, limits.t
-    if cycle is None or job is None:
+    if cycle is None or job is None or job.kept != "running":
         return memory
     fresh = is_fresh(senses, now, limits)
     why = ""
@@ -242,16 +243,21 @@ def _end(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workcell
 
 def _start(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
     """Start the next request's cycle if nothing forbids it."""
-    senses = memory.senses
-    if memory.cycle is not None or any(obstacles(memory, now, limits)) or not senses.seen():
-        return memory
-    if not senses.is_off("done") or senses.is_off("ready") or senses.is_on("busy"):
+    if memory.cycle is not None or not _may_start(memory, now, limits):
         return memory
     for job in memory.jobs:
         if job.phase == job.kept == "queued" and _is_asked(job, now, limits):
             started = _put(memory, replace(job, phase="running"))
             return replace(started, cycle=Cycle(job.guid, now))
     return memory
+
+
+def _may_start(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> bool:
+    """Return whether the inputs, and all else but the request, permit the start of a cycle."""
+    senses = memory.senses
+    if any(obstacles(memory, now, limits)) or not senses.seen():
+        return False
+    return senses.is_off("done") and not (senses.is_off("ready") or senses.is_on("busy"))
 
 
 def _is_asked(job: Job, now: float, limits: WorkcellLimits) -> bool:

@@ -149,6 +149,16 @@ def test_a_cycle_that_rmf_gave_up_before_its_start_was_on_disk_waits_again() -> 
     assert cell.outputs == ON
 
 
+@pytest.mark.parametrize("now", [{"done": True}, {"ready": False}, {"busy": True}], ids=str)
+def test_a_start_that_waited_for_the_disk_is_checked_again(now: dict[str, bool]) -> None:
+    """DISPENSER-4."""
+    cell = asked().take(MemoryNotKept("disk full"))
+    cell.take(Sampled(replace(CALM, **now)), ASKS, at=14.0).take(MemoryKept())
+    assert (cell.outputs.start, cell.report.queue) == (False, ("task",))
+    cell.take(Sampled(CALM), ASKS, at=15.0).take(MemoryKept(), MemoryKept())
+    assert cell.outputs == ON
+
+
 def test_a_cycle_whose_start_comes_late_to_the_disk_has_its_whole_pulse_and_time() -> None:
     """DISPENSER-2: the pulse and the cycle's time limit begin when the start is on the disk."""
     cell = asked(PULSED).take(MemoryNotKept("disk full"))
