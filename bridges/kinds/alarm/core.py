@@ -7,7 +7,7 @@ for every kind. A panel has no outputs.
 Rules:
 ALARM-1. A source becomes active when it has been asserted for its debounce time. It is over when it has
    not been asserted for `clear_s`. Until a source has settled for the first time, a single asserted
-   reading counts. A failed reading restarts the debounce.
+   reading counts. A failed reading restarts the time `clear_s`, but not the debounce of a begin.
 ALARM-2. After `stale_after_s` without a good reading the panel is silent, which is a fault. Its sources
    keep their last values, and none of them can be reset.
 ALARM-3. If the panel is silent for `silent_alarm_after_s`, the silence itself is a cause of an alarm.
@@ -42,7 +42,8 @@ def decide(
         case Sampled(sample):
             memory = _read(memory, sample, now, limits)
         case IoFailed(reason):
-            kept = {name: one for name, old in memory.sources.items() if (one := forget(old))}
+            old = memory.sources
+            kept = {name: one for name in old if (one := forget(old[name], hazard=True))}
             memory = replace(memory, io_fault=reason, sources=kept, drill=forget(memory.drill))
     wake_at = min((at for at in _wakes(memory, now, limits) if at > now), default=NEVER)
     return Decision(memory, PanelOutputs(), _report(memory, now, limits), wake_at)

@@ -6,7 +6,8 @@ DOOR-SENSING-1. A change of an input counts when it has lasted for the signal's 
    fire alarm or of an obstruction counts when it has lasted for `hazard_clear_s`. Before the input of a
    hazard has settled once, a single reading of the hazard counts.
 DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown again, because the door
-   may have moved.
+   may have moved. After a shorter gap the values stay, and a running debounce starts again. Only the
+   debounce of a hazard's begin goes on, so that a bus that fails again and again hides no hazard.
 DOOR-SENSING-3. If the YAML sets `feedback: estimated`, a missing limit contact is estimated from the
    time for which the relay has been on or off. A failed read or write restarts that time.
 DOOR-SENSING-4. If a controller reports that it does not know the door's position (`lost`), the report
@@ -74,8 +75,8 @@ def miss(senses: DoorSenses) -> DoorSenses:
         senses,
         opened=forget(senses.opened),
         closed=forget(senses.closed),
-        obstruction=forget(senses.obstruction),
-        fire=forget(senses.fire),
+        obstruction=forget(senses.obstruction, hazard=True),
+        fire=forget(senses.fire, hazard=True),
         linked_since=None,
     )
 

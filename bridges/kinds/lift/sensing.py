@@ -6,7 +6,8 @@ LIFT-SENSING-1. A change of an input counts when it has lasted for the signal's 
    settled once. At the start this is no fault. Later, an input may keep changing and not settle within
    its debounce and `RESTLESS_S`. All inputs are then unknown again.
 LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown, because the car may be
-   anywhere. After a shorter gap the values stay, and a running debounce starts again.
+   anywhere. After a shorter gap the values stay, and a running debounce starts again. Only the debounce
+   of a hazard's begin goes on, so that a bus that fails again and again hides no hazard.
 LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. The code is
    rejected if it skips floors faster than a car travels. With motion lines the code is also rejected if
    it changes while the car stands. After a rejection the position is unknown until the code shows the
@@ -128,7 +129,7 @@ def gap(senses: LiftSenses, now: float) -> LiftSenses:
         (forget(senses.doors[0]), forget(senses.doors[1])),
         forget(senses.motion),
         forget(senses.agv),
-        {h: s for h, before in senses.hazards.items() if (s := forget(before))},
+        {h: s for h, old in senses.hazards.items() if (s := forget(old, hazard=True))},
         replace(senses.position, moved_at=now),
     )
 

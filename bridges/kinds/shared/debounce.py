@@ -48,8 +48,14 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
     return Settled(seen, seen, before.since, steady_at=now)
 
 
-def forget(before: "Settled[T] | None") -> "Settled[T] | None":
-    """Keep the value after a gap in the readings, and restart the candidate's debounce."""
-    if before is None or before.steady_at is None:
+def forget(before: "Settled[T] | None", *, hazard: bool = False) -> "Settled[T] | None":
+    """Keep the value after a gap in the readings, and restart the candidate's debounce.
+
+    The debounce of a `hazard` that was read goes on. Otherwise a bus that fails again and again would
+    hide the hazard for as long as it fails.
+    """
+    if before is None or (hazard and before.candidate is True):
+        return before
+    if before.steady_at is None:
         return None
-    return replace(before, candidate=cast(T, before.value), torn_since=None)
+    return replace(before, candidate=cast(T, before.value))

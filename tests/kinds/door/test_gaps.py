@@ -5,6 +5,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.door.memory import DoorLimits
 from bridges.kinds.door.report import DoorReport
+from bridges.kinds.door.settings import DoorDurations
 from bridges.kinds.door.signals import DoorSample, Event
 from bridges.kinds.shared.decision import (
     Fault,
@@ -72,14 +73,14 @@ def test_after_a_gap_a_contact_must_settle_again() -> None:
     ("contact", "before", "after"),
     [
         ("closed", BETWEEN, CLOSED),
-        ("obstruction", replace(OPEN, obstruction=False), replace(OPEN, obstruction=True)),
-        ("fire", replace(OPEN, fire=False), replace(OPEN, fire=True)),
+        ("obstruction", replace(OPEN, obstruction=True), replace(OPEN, obstruction=False)),
+        ("fire", replace(OPEN, fire=True), replace(OPEN, fire=False)),
     ],
 )
 def test_after_a_gap_every_contact_must_settle_again(
     contact: str, before: DoorSample, after: DoorSample
 ) -> None:
-    core = CoreAlone(DoorLimits(debounce={contact: 0.5}))
+    core = CoreAlone(DoorLimits(DoorDurations(hazard_clear_s=0.5), debounce={contact: 0.5}))
     core.sees(before, until=2.0)
     core.sees(after, until=2.375)
     core.hears(IoFailed("no reply"))
@@ -89,6 +90,16 @@ def test_after_a_gap_every_contact_must_settle_again(
         value = getattr(core.memory.senses, contact).value
         seen.append(value == getattr(after, contact))
     assert seen == [False, False, True]
+
+
+@pytest.mark.parametrize("hazard", ["obstruction", "fire"])
+def test_a_bus_that_fails_at_every_second_reading_hides_no_hazard(hazard: str) -> None:
+    core = CoreAlone(DoorLimits(debounce={hazard: 0.5}))
+    core.sees(replace(OPEN, obstruction=False, fire=False), until=2.0)
+    for _ in range(5):
+        core.hears(IoFailed("no reply"))
+        core.sees(replace(OPEN, **{hazard: True}), until=core.now + 0.125)
+    assert getattr(core.memory.senses, hazard).value is True
 
 
 def test_after_one_reading_and_a_gap_the_position_of_a_door_is_unknown() -> None:

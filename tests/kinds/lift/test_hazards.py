@@ -15,11 +15,12 @@ from bridges.kinds.lift.signals import (
 )
 from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.decision import (
+    IoFailed,
     RivalSeen,
 )
 from bridges.messages.definitions import Bool, EmergencySignal
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, RETAINED
-from tests.kinds.lift.alone import AT_L1, CLOSED, Alone
+from tests.kinds.lift.alone import AT_L1, CLOSED, DEBOUNCE, Alone
 from tests.kinds.lift.story import Building, Controller, Story
 
 CLOSED_AT_L1 = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=True)
@@ -524,3 +525,21 @@ def test_a_second_node_for_this_lift_switches_the_outputs_off_until_that_node_is
 def test_the_core_wakes_when_another_node_has_gone() -> None:
     alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(1.0, RivalSeen())
     assert alone.decision.wake_at == 6.0
+
+
+def test_a_bus_that_fails_at_every_second_reading_hides_no_hazard() -> None:
+    """LIFT-SENSING-2."""
+    lift = Alone(stale_after_s=1.0)(0.5, AT_L1)(1.0, AT_L1)
+    fire = replace(AT_L1, hazards=frozenset({Hazard.FIRE}))
+    for now in (1.1, 1.2, 1.3, 1.4):
+        lift(now, IoFailed("no reply"))(now + 0.05, fire)
+    assert "FIRE" in {fault.code for fault in lift.faults}
+
+
+def test_a_bus_that_fails_at_every_second_reading_shows_no_old_contacts_for_long() -> None:
+    """LIFT-SENSING-1: the inputs are not steady."""
+    lift = Alone(DEBOUNCE, stale_after_s=1.0)(0.5, AT_L1)(1.0, AT_L1)
+    for step in range(30):
+        now = 1.1 + step / 10
+        lift(now, IoFailed("no reply"))(now + 0.05, replace(CLOSED, level="L2"))
+    assert lift.faults[0].code == "INPUTS_NOT_FRESH"

@@ -59,7 +59,7 @@ def test_the_debounce_tells_since_when_no_value_has_lasted() -> None:
 def test_after_a_gap_the_believed_value_stays_and_a_new_value_starts_again() -> None:
     steady = Settled(1, 1, 0.0, steady_at=0.1)
     half = settle(steady, 2, 1.0, HOLD_S)
-    assert forget(half) == Settled(1, 1, 1.0, steady_at=0.1)
+    assert forget(half) == Settled(1, 1, 1.0, steady_at=0.1, torn_since=1.0)
     assert forget(steady) == steady
     assert forget(settle(None, 1, 0.0, HOLD_S)) is None
     assert forget(None) is None
