@@ -71,7 +71,7 @@ class FileReason:
             REFUSED: f"because a request was refused: {self.text}",
             WAITING: f"because {self.text}",
             DIED: f"because the daemon died: {self.text}",
-        }.get(self.code, f'by a person, who wrote "{self.text}"')
+        }.get(self.code, "by a person" + (f', who wrote "{self.text}"' if self.text else ""))
         return (
             f"This file was kept {why}. The next sentences are about {clock.time(clock.now.wall)}."
         )

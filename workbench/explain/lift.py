@@ -271,6 +271,14 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
             "the controller",
             f"bring the car to {claim.wants}",
         )
+    elif on and "hold_door" not in on and lift.motion.value != "stopped":
+        found.say(
+            f"The floor code shows {claim.wants}, but the daemon does not see the car stand (motion"
+            f" {lift.motion.value}), so it does not open the door{on}.",
+            "a person",
+            "check the contacts that show whether the car stands; if they are right, the car has not"
+            " stopped",
+        )
     else:
         found.say(
             f"The car is there, but its door has been {lift.door.value}"

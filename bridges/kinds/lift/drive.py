@@ -45,6 +45,11 @@ def at_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits)
     return view.stopped and view.level == limits.stops[session.destination].level
 
 
+def is_not_seen_to_stand(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
+    """Return whether the car is at the destination, but its motion lines do not say that it stands."""
+    return not view.stopped and view.level == limits.stops[session.destination].level
+
+
 def agv_ok(view: BelievedLift) -> bool:
     """Return whether AGV mode is on. Without a status line for AGV mode, assume that AGV mode is on."""
     return view.agv is not False
@@ -102,7 +107,7 @@ def advance(
     if waiting is None:
         return replace(session, tries=0, fault=None)
     if now >= session.since + _time_for(waiting, limits):
-        return _trip(session, _timeout_fault(session, waiting, limits), now)
+        return _trip(session, _timeout_fault(session, waiting, view, limits), now)
     return session
 
 
@@ -186,12 +191,15 @@ def _time_for(waiting: Waiting, limits: LiftLimits) -> float:
     return {"agv": t.agv_timeout_s, "floor": t.floor_timeout_s, "door": t.door_timeout_s}[waiting]
 
 
-def _timeout_fault(session: LiftSession, waiting: Waiting, limits: LiftLimits) -> Fault:
+def _timeout_fault(
+    session: LiftSession, waiting: Waiting, view: BelievedLift, limits: LiftLimits
+) -> Fault:
     after = f"after {_time_for(waiting, limits):g} s"
     if waiting == "agv":
         return Fault("AGV_MODE_NOT_GRANTED", f"no AGV mode status {after}")
     if waiting == "floor":
-        return Fault("RUNTIME_LIMIT_EXCEEDED", f"not at {session.destination} {after}")
+        seen = "not seen to stand" if is_not_seen_to_stand(session, view, limits) else "not"
+        return Fault("RUNTIME_LIMIT_EXCEEDED", f"{seen} at {session.destination} {after}")
     return Fault("DOOR_OPENING_FAULT", f"not open at {session.destination} {after}")
 
 

@@ -115,6 +115,8 @@ def _waits(
         return f"for {output}: its relay must rest"
     if wanted.agv_request and session.waiting:
         at = f" at {session.destination}"
+        if session.waiting == "floor" and drive.is_not_seen_to_stand(session, view, limits):
+            return f"for the car to be seen to stand{at}"
         return {"agv": "for AGV mode", "floor": f"for the car{at}", "door": f"for the door{at}"}[
             session.waiting
         ]

@@ -17,6 +17,8 @@ from bridges.kinds.shared.decision import (
 )
 from tests.kinds.lift.alone import ASKED, AT_L1, CLOSED, Alone
 
+UP = replace(AT_L1, motion=Motion.UP)
+
 FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     "a fire that was": (
         [(0.0, replace(AT_L1, hazards=frozenset({Hazard.FIRE}))), (0.5, AT_L1), (1.6, AT_L1)],
@@ -65,6 +67,10 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     "a car that does not come": (
         [(0.0, AT_L1), (0.1, LiftRequested("A", True, "L3")), (0.8, AT_L1)],
         Fault("RUNTIME_LIMIT_EXCEEDED", "not at L3 after 0.6 s"),
+    ),
+    "a car that is not seen to stand": (
+        [(0.0, UP), (0.1, LiftRequested("A", True, "L1")), (0.8, UP)],
+        Fault("RUNTIME_LIMIT_EXCEEDED", "not seen to stand at L1 after 0.6 s"),
     ),
     "a door that does not open": (
         [(0.0, CLOSED), (0.1, ASKED), (0.9, CLOSED)],

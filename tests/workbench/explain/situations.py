@@ -105,6 +105,16 @@ def floor_contact_lost() -> Case:
     return scene.heard, "lift", "Lift2"
 
 
+def stopped_contact_lost() -> Case:
+    """The car stands at its floor, but the contact for that shows nothing."""
+    scene = Scene("Lift2")
+    red = scene.robot("fleet/red")
+    scene.fail("Lift2", "stopped", "off")
+    red.asks("Lift2", "L2")
+    scene.run(30.0)
+    return scene.heard, "lift", "Lift2"
+
+
 def forgotten_by_rmf() -> Case:
     """RMF's supervisor has restarted, and asks for a second robot. The first robot still has the lift,
     but its fleet adapter is dead."""
@@ -307,6 +317,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         fire_with_a_robot_inside,
         open_but_at_no_floor,
         floor_contact_lost,
+        stopped_contact_lost,
         forgotten_by_rmf,
         unknown_floor,
         foreign_node_refuses,

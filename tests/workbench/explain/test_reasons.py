@@ -103,7 +103,7 @@ def test_a_dead_daemons_file_is_about_its_death(kind: Kind) -> None:
     [
         (WAITING, "fleet/red has waited for L2 for 180 s", "because fleet/red has waited for L2"),
         ("OPERATOR", "it jerked", 'by a person, who wrote "it jerked".'),
-        ("OPERATOR", "", 'by a person, who wrote "".'),
+        ("OPERATOR", "", "by a person."),
         ("LATER", "of a later version", 'by a person, who wrote "of a later version".'),
     ],
 )
