@@ -72,6 +72,7 @@ def test_a_thread_that_dies_of_a_defect_switches_off_first(
     thread.start()
     rounds.inbox.wake()
     wait_until(lambda: not thread.alive, "the thread has died")
+    thread.ended(10.0)  # it logs its death, and switches off, a moment later
     died = 'died thread=rounds reason="a defect of ours"'
     assert [r.getMessage() for r in caplog.records] == [died]
     assert (rounds.ended, thread.finished) == (1, 0)

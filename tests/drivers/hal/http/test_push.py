@@ -213,6 +213,6 @@ def test_a_token_opens_the_websocket_too(tmp_path: Any) -> None:
     file = tmp_path / "token"
     file.touch(mode=0o600)
     file.write_text("t0ken")
-    with pushing(silent) as (port, asked), listening(port, token_file=str(file)) as (_, wakes):
-        wakes.more_than(0)
+    with pushing(silent) as (port, asked), listening(port, token_file=str(file)):
+        wait_until(lambda: bool(asked), "the server has been asked")
         assert asked == ["Bearer t0ken"]
