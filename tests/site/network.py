@@ -99,10 +99,8 @@ class Air:
         lost = weather.lost
         if hearer in self.best_effort and topic.name in STATES:
             lost += weather.states_lost
-        if draw < lost and speaker in self.unrepeated:
-            return (delay + weather.latest_s,)
         if draw < lost:
-            return ()
+            return (delay + weather.latest_s,) if speaker in self.unrepeated else ()
         if draw > 1.0 - weather.late:
             self.counts["late"] += 1
             delay += weather.latest_s * random()

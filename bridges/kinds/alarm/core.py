@@ -42,8 +42,11 @@ def decide(
         case Sampled(sample):
             memory = _read(memory, sample, now, limits)
         case IoFailed(reason):
-            old = memory.sources
-            kept = {name: one for name in old if (one := forget(old[name], hazard=True))}
+            kept = {
+                name: one
+                for name, old in memory.sources.items()
+                if (one := forget(old, hazard=True))
+            }
             memory = replace(memory, io_fault=reason, sources=kept, drill=forget(memory.drill))
     wake_at = min((at for at in _wakes(memory, now, limits) if at > now), default=NEVER)
     return Decision(memory, PanelOutputs(), _report(memory, now, limits), wake_at)

@@ -43,8 +43,7 @@ Here = Mapping[str, Sequence[RobotName]]
 
 def allot(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Give the free stations to the waiting robots, in the order of the queue."""
-    waiting = queued(memory)
-    here = standing(memory, site) if waiting else {}
+    waiting, here = queued_and_standing(memory, site)
     for wish in waiting:
         stations = suiting(memory, wish, site)
         station = next((s for s in stations if _free(memory, s, wish.robot, now, here)), None)
@@ -67,6 +66,13 @@ def queued(memory: SiteMemory) -> list[Wish]:
     """List the wishes without a station, in the order of service."""
     allotted = memory.allotted
     return [wish for wish in memory.wishes if wish.robot not in allotted]
+
+
+def queued_and_standing(memory: SiteMemory, site: SiteLimits) -> tuple[list[Wish], Here]:
+    """List the wishes without a station, and the robots at each station. If no robot waits, nobody's
+    place matters, and no station is listed."""
+    waiting = queued(memory)
+    return waiting, standing(memory, site) if waiting else {}
 
 
 def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:

@@ -17,7 +17,12 @@ from bridges.kinds.charger_coordinator.memory import (
     SiteLimits,
     SiteMemory,
 )
-from bridges.kinds.charger_coordinator.queue import Here, in_the_way, queued, standing, suiting
+from bridges.kinds.charger_coordinator.queue import (
+    Here,
+    in_the_way,
+    queued_and_standing,
+    suiting,
+)
 from bridges.kinds.shared.durations import NEVER
 
 MOST: Final = 4
@@ -28,8 +33,7 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
     """Yield a text for each waiting robot, such as `tiny/AMR03 by the robot: charger_b charges
     tiny/AMR01, free in 12 min`."""
     taken: set[str] = set()
-    waiting = queued(memory)
-    here = standing(memory, site) if waiting else {}
+    waiting, here = queued_and_standing(memory, site)
     for wish in waiting:
         stations = suiting(memory, wish, site)
         left = [name for name in stations if name not in taken]

@@ -29,7 +29,7 @@ from bridges.kinds.charger.pad import misplaced_in
 from bridges.kinds.charger.report import FaultCause
 from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.memory import CHARGING, Nudge, SiteLimits, SiteMemory
-from bridges.kinds.charger_coordinator.queue import Here, queued, standing, suiting
+from bridges.kinds.charger_coordinator.queue import Here, queued_and_standing, suiting
 from bridges.kinds.charger_coordinator.wishes import SETTLES_S
 from bridges.kinds.shared.durations import NEVER
 
@@ -126,8 +126,7 @@ def _stands(
 
 def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
     """Yield robots without a station that stand on a pad for which another robot waits."""
-    waiting = queued(memory)
-    here = standing(memory, site) if waiting else {}
+    waiting, here = queued_and_standing(memory, site)
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
     for wish in waiting if idle else ():
         for name in suiting(memory, wish, site):

@@ -42,12 +42,16 @@ RETRY_AFTER_S = (10.0, 30.0, 60.0)
 
 def at_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
     """Return whether the car stands at the session's destination."""
-    return view.stopped and view.level == limits.stops[session.destination].level
+    return view.stopped and _shows_destination(session, view, limits)
 
 
 def is_not_seen_to_stand(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
     """Return whether the car is at the destination, but its motion lines do not say that it stands."""
-    return not view.stopped and view.level == limits.stops[session.destination].level
+    return not view.stopped and _shows_destination(session, view, limits)
+
+
+def _shows_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
+    return view.level == limits.stops[session.destination].level
 
 
 def agv_ok(view: BelievedLift) -> bool:

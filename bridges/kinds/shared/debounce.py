@@ -49,7 +49,8 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
 
 
 def forget(before: "Settled[T] | None", *, hazard: bool = False) -> "Settled[T] | None":
-    """Keep the value after a gap in the readings, and restart the candidate's debounce.
+    """Keep the value after a gap in the readings, and restart the candidate's debounce. The time for
+    which readings have kept changing goes on.
 
     The debounce of a `hazard` that was read goes on. Otherwise a bus that fails again and again would
     hide the hazard for as long as it fails.

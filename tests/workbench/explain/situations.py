@@ -97,22 +97,12 @@ def open_but_at_no_floor() -> Case:
 
 def floor_contact_lost() -> Case:
     """The car stands at a floor, but the floor's contact shows nothing."""
-    scene = Scene("Lift2")
-    red = scene.robot("fleet/red")
-    scene.fail("Lift2", "floor_L3", "off")
-    red.asks("Lift2", "L3")
-    scene.run(150.0)
-    return scene.heard, "lift", "Lift2"
+    return _asked_with_a_cut_contact("floor_L3", "L3", for_s=150.0)
 
 
 def stopped_contact_lost() -> Case:
     """The car stands at its floor, but the contact for that shows nothing."""
-    scene = Scene("Lift2")
-    red = scene.robot("fleet/red")
-    scene.fail("Lift2", "stopped", "off")
-    red.asks("Lift2", "L2")
-    scene.run(30.0)
-    return scene.heard, "lift", "Lift2"
+    return _asked_with_a_cut_contact("stopped", "L2", for_s=30.0)
 
 
 def forgotten_by_rmf() -> Case:
@@ -338,6 +328,15 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         coordinator_queues,
     )
 }
+
+
+def _asked_with_a_cut_contact(contact: str, floor: str, for_s: float) -> Case:
+    scene = Scene("Lift2")
+    red = scene.robot("fleet/red")
+    scene.fail("Lift2", contact, "off")
+    red.asks("Lift2", floor)
+    scene.run(for_s)
+    return scene.heard, "lift", "Lift2"
 
 
 def _two(lift: str) -> tuple[Scene, Guest, Guest]:
