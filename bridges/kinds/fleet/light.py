@@ -14,9 +14,10 @@ FLEET-LIGHT-2. A robot may drive only to the checkpoint that RMF has granted. So
 FLEET-LIGHT-3. If a robot stands less than `pauses_m` before a granted checkpoint, it counts as standing
    at that checkpoint. RMF never hears that the robot has reached a checkpoint that RMF has not granted,
    unless the robot has really passed it.
-FLEET-LIGHT-4. A robot is resumed only if we have paused it, because a person may have paused it too. It
-   is resumed only if RMF says so or if its path is over. After an operator's reset, a paused robot
-   counts as paused by us. `keep.py` saves on disk which robots we have paused.
+FLEET-LIGHT-4. A robot is resumed only if we have paused it, because a person may have paused it too. A
+   robot that reports a pause before ours counts as paused by others, even while it still rolls. It is
+   resumed only if RMF says so or if its path is over. After an operator's reset, a paused robot counts
+   as paused by us. `keep.py` saves on disk which robots we have paused.
 FLEET-LIGHT-5. If RMF answers with an error and the robot stands, RMF gets the path again, beginning at
    the robot's present place.
 """
@@ -176,7 +177,8 @@ def steer(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
     if must_stand(memory, now, limits):
         if doing == "pause" or (still and (light.held or by_others)):
             return memory
-        return _begin(replace(memory, light=replace(light, held=True)), "pause", now)
+        held = light.held or not by_others
+        return _begin(replace(memory, light=replace(light, held=held)), "pause", now)
     if not (light.held and still) or doing == "resume":
         return memory
     if not light.path or (light.answer and light.answer.says == "resume"):

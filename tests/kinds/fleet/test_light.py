@@ -248,6 +248,18 @@ def test_a_robot_that_a_person_has_paused_is_not_resumed() -> None:  # FLEET-LIG
     assert story.commands[-1][1] == "resume 3, attempt 1"
 
 
+def test_a_persons_pause_stays_a_persons_while_the_robot_still_rolls() -> None:  # FLEET-LIGHT-4
+    story = started()
+    says(story, "continue", 0).see(at=at(1.5), paused=True)
+    says(story, "stay", 0)
+    assert story.commands[-1][1] == "pause 3, attempt 1"
+    assert not story.memory.light.held
+    story.see(SCAN_S, at=at(1.6), moving=False)
+    says(story, "resume", 0).see(60.0)
+    assert story.memory.command is None
+    assert story.faults == ["ROBOT_PAUSED_BY_OTHERS"]
+
+
 def test_a_paused_robot_without_a_path_is_let_go() -> None:  # FLEET-LIGHT-4
     story = standing().see(paused=True).see(path=())
     assert story.commands[-1][1] == "resume 2, attempt 1"
