@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Final
 
 from bridges.blackbox import days
-from bridges.blackbox.entries import AnyEntry, Clocks, DaemonDied, DaemonEnded, Decided, Head, Known
+from bridges.blackbox.entries import AnyEntry, Clocks, Head, Known
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
 from bridges.blackbox.recordings import CONTINUOUS, DEATH, Recordings, reason
 from bridges.blackbox.ring import DIED as DIED_NAME
 from bridges.blackbox.ring import NAME, RingContent, RingError, Tail
-from bridges.blackbox.triggers import AGAIN_S, DIED, Triggers
+from bridges.blackbox.triggers import AGAIN_S, Triggers, death
 from bridges.kinds.shared.durations import AGES_AGO
 from bridges.observe.all_devices import Key
 from bridges.observe.tally import DeviceCounts
@@ -133,11 +133,10 @@ class Recorder:
             return
         self._seen_dead.add(identity)
         entries = list(read.entries())
-        served = any(isinstance(entry, Decided) for entry in entries)
-        if served and not read.ended and self._is_first(read.head):
-            at = entries[-1].at
-            note = Note(at, DIED, _last_words(entries))
-            self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DEATH)
+        died = None if read.ended else death(entries)
+        if died is not None and self._is_first(read.head):
+            lasted = part(entries, died.at - BEFORE_S, died.at)
+            self._put(Incident(read.head, lasted, (died,)), DEATH)
 
     def _is_first(self, head: Head) -> bool:
         """Return whether this run's death must be recorded. Return False if it is recorded already, or
@@ -239,16 +238,6 @@ class _Followed:
         end = len(self._part) if whole or not known else known[-1]
         entries, self._part = self._part[:end], self._part[end:]
         return [(Incident(self.head, entries), CONTINUOUS)] if entries else []
-
-
-def _last_words(entries: Sequence[AnyEntry]) -> str:
-    """Return the cause of a run's death, according to the run's last entries."""
-    for entry in entries:
-        if isinstance(entry, DaemonDied):
-            return entry.reason
-    if isinstance(entries[-1], DaemonEnded):
-        return "the daemon ended, and not every output was verified off"
-    return "the daemon left no last entry: it was killed, or the machine stopped"
 
 
 def _runs(pid: int) -> bool:

@@ -9,10 +9,18 @@ reasons are:
 A reason does not count if the same reason came for the same subject within the last AGAIN_S.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
-from bridges.blackbox.entries import AnyEntry, DaemonDied, Decided, Known, Spoken, SubjectForgotten
+from bridges.blackbox.entries import (
+    AnyEntry,
+    DaemonDied,
+    DaemonEnded,
+    Decided,
+    Known,
+    Spoken,
+    SubjectForgotten,
+)
 from bridges.blackbox.incident import Note
 from bridges.blackbox.value_codec import Tree
 from bridges.kinds.shared.decision import EXPECTED
@@ -27,7 +35,20 @@ from bridges.observe.tally import SiteTally
 AGAIN_S: Final = 600.0
 MOST_NOTED: Final = 1000
 
-FAULT, REFUSED, WAITING, DIED = "FAULT", "REFUSED", "WAITING", "DIED"
+FAULT, REFUSED, WAITING, DIED, OPERATOR = "FAULT", "REFUSED", "WAITING", "DIED", "OPERATOR"
+
+
+def death(entries: Sequence[AnyEntry]) -> Note | None:
+    """Return the reason to record a run that did not shut down cleanly. Return None for a run without
+    a decision, because the log explains a failed start."""
+    if not any(isinstance(entry, Decided) for entry in entries):
+        return None
+    told = [entry.reason for entry in entries if isinstance(entry, DaemonDied)]
+    last = entries[-1]
+    if isinstance(last, DaemonEnded):
+        told.append("the daemon ended, and not every output was verified off")
+    told.append("the daemon left no last entry: it was killed, or the machine stopped")
+    return Note(last.at, DIED, told[0])
 
 
 class Triggers:

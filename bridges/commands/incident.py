@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note, part
 from bridges.blackbox.ring import DIED, NAME, RingContent, RingError
+from bridges.blackbox.triggers import OPERATOR, death
 from bridges.runtime import holder
 from bridges.runtime.clock import machine_s
 from bridges.runtime.runtime_directory import find
@@ -94,29 +95,41 @@ def _hint(*, died: bool) -> str:
 def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
     """Return the last 120 s of the daemon.
 
-    If `follows` is True, the daemon runs. Then wait, and add the later events. With `--died`, return
-    the last 120 s of the previous run. Raises RingError.
+    If `follows` is True, the daemon runs. Then wait, and add the later events. Otherwise the ring's run
+    is over. Raises RingError.
     """
-    before = RingContent(ring)
-    if args.died:
-        entries = list(before.entries())
-        at = entries[-1].at if entries else 0.0
-        return Incident(before.head, part(entries, at - BEFORE_S, at), _notes(at, args.note))
-    at = machine_s()
-    if follows:
-        _wait(args.after)
-    else:
-        print(f"no daemon serves {args.file} now, so no later events will come")
+    before, at = RingContent(ring), machine_s()
+    if not follows:
+        if not args.died:
+            print(f"no daemon serves {args.file} now, so no later events will come")
+        return _over(before, args.note)
+    _tell_of_death(ring.with_name(DIED))
+    _wait(args.after)
     try:
         after = RingContent(ring)
     except RingError:
         after = before
-    entries = list(after.entries())
-    return Incident(after.head, part(entries, at - BEFORE_S, at + AFTER_S), _notes(at, args.note))
+    note, entries = Note(at, OPERATOR, args.note), list(after.entries())
+    return Incident(after.head, part(entries, at - BEFORE_S, at + AFTER_S), (note,))
 
 
-def _notes(at: float, text: str) -> tuple[Note, ...]:
-    return (Note(at, "OPERATOR", text),)
+def _over(ring: RingContent, text: str) -> Incident:
+    """Return the last 120 s of a run that is over. If the run died, its death is the first reason."""
+    entries = list(ring.entries())
+    at = entries[-1].at if entries else 0.0
+    died = None if ring.ended else death(entries)
+    note = Note(at, OPERATOR, text)
+    notes = (note,) if died is None else (died, note) if text else (died,)
+    return Incident(ring.head, part(entries, at - BEFORE_S, at), notes)
+
+
+def _tell_of_death(ring: Path) -> None:
+    """Say that an earlier run died, because the present run's ring does not show that run."""
+    try:
+        ended = datetime.fromtimestamp(ring.stat().st_mtime)
+    except OSError:
+        return
+    print(f"an earlier run died at {ended:%Y-%m-%d %H:%M:%S}; --died records its last minutes")
 
 
 def _wait(seconds: float) -> None:

@@ -111,6 +111,36 @@ def test_the_recorder_makes_a_file_of_a_daemon_that_is_killed(
     assert bridge("replay", file).returncode == 0
 
 
+def test_an_incident_of_a_killed_daemon_is_about_its_death(
+    lift: Path, tmp_path: Path, domain: int
+) -> None:
+    place = tmp_path / "run"
+    where = ("--runtime-dir", str(place))
+    served = (lift, place, "--simulate", "--domain-id", str(domain))
+    with daemon(*served) as running:
+        wait_until(lambda: states(place) > 2, "states are in the ring")
+        running.end(signal.SIGKILL)
+    dead = bridge("incident", lift, "--note", "it stood", "-o", "dead.mcap", *where)
+    with daemon(*served) as running:
+        wait_until((place / "ring.died").exists, "the dead run's ring is put aside")
+        now = bridge("incident", lift, "--after", "0", "-o", "now.mcap", *where)
+        died = bridge("incident", lift, "--died", "-o", "died.mcap", *where)
+        running.end(signal.SIGTERM)
+    codes = {
+        name: [note.code for note in notes_in(tmp_path / f"{name}.mcap")]
+        for name in ("dead", "now", "died")
+    }
+    told = bridge("explain", tmp_path / "dead.mcap").stdout
+
+    assert (dead.returncode, now.returncode, died.returncode) == (0, 0, 0)
+    assert codes == {"dead": ["DIED", "OPERATOR"], "now": ["OPERATOR"], "died": ["DIED"]}
+    assert now.stdout.startswith("an earlier run died at ")
+    assert "died" not in died.stdout.replace("died.mcap", "")
+    assert "This file was kept because the daemon died" in told
+    assert 'A person wrote "it stood".' in " ".join(told.split())
+    assert "there is nothing to do" not in told
+
+
 def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
     lift: Path, tmp_path: Path
 ) -> None:

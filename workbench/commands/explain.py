@@ -9,7 +9,7 @@ import shutil
 import sys
 import time
 from contextlib import closing
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Final
 
@@ -142,9 +142,14 @@ def _one(site: HeardDevices, args: argparse.Namespace) -> int:
         several = " and a ".join(kinds)
         complain("explain", f"'{name}' is a {several}: choose with --kind")
         return 2
-    found = site.explain(kinds[0], name, None, faults.for_explain())
+    found = _explained(site, kinds[0], name)
     _tell(found, as_json=args.json)
     return 0 if site.robot(name) or (kinds[0], name) in site.devices() else 1
+
+
+def _explained(site: HeardDevices, kind: Explained, name: str) -> Explanation:
+    found = site.explain(kind, name, None, faults.for_explain())
+    return found if site.kinds(name) else replace(found, kind="device")
 
 
 def _tell(found: Explanation, *, as_json: bool) -> None:
@@ -191,7 +196,7 @@ def _follow(ear: Ear, past: Ear, site: HeardDevices, args: argparse.Namespace) -
     _listen(ear, past, site, args.for_s)
     while True:
         kinds: list[Explained] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
-        found = site.explain(kinds[0], args.live, None, faults.for_explain())
+        found = _explained(site, kinds[0], args.live)
         news = [SECONDS.sub("", text) for text in found.now], found.next
         if news != told:
             _tell(found, as_json=args.json)

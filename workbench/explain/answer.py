@@ -52,11 +52,13 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class FileReason:
-    """Our recorder's reason to keep a file. The reason has a fixed name, a text, and the time."""
+    """Our recorder's reason to keep a file. The reason has a fixed name, a text, and the time. `wrote`:
+    the text of a person who kept the file of a dead daemon."""
 
     code: str
     text: str
     at: Moment
+    wrote: str = ""
 
     @property
     def fault(self) -> str:
@@ -72,6 +74,8 @@ class FileReason:
             WAITING: f"because {self.text}",
             DIED: f"because the daemon died: {self.text}",
         }.get(self.code, "by a person" + (f', who wrote "{self.text}"' if self.text else ""))
+        if self.wrote:
+            why += f'. A person wrote "{self.wrote}"'
         return (
             f"This file was kept {why}. The next sentences are about {clock.time(clock.now.wall)}."
         )
@@ -141,16 +145,16 @@ def _others(around: OthersHeard) -> str:
 
 
 def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer | None:
-    """Answer for a device whose states have stopped, or whose daemon has died. The daemon's death may
-    be the reason for which the recorder kept the file. Return None for any other device."""
+    """Answer for a device whose states have stopped, or for a file that was kept because its daemon
+    died. This daemon may be the device's supervisor. Return None for any other device."""
     last = device.last_state
     if last is not None and around.reason is not None and around.reason.code == DIED:
         return Answer(since=last.at - 60.0, because=()).say(
-            f"The daemon of {device.name} died then. The file ends at its death, so what came after is"
-            " unknown.",
+            "The daemon that wrote this file died then. The file ends at its death, so what came after"
+            " is unknown.",
             "a person",
-            f"see whether the daemon of {device.name} runs again and its relays are off"
-            " (`rmf-bridge status`), and why it died (`rmf-bridge log`, the journal)",
+            "see whether that daemon runs again and its relays are off (`rmf-bridge status`), and why"
+            " it died (`rmf-bridge log`, the journal)",
         )
     if last is None or not device.is_silent(clock.now):
         return None

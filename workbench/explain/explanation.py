@@ -75,6 +75,7 @@ class FaultTold:
 class Explanation:
     """The explanation of one device or robot, at the time of the last message.
 
+    - `kind`: "device" for a name from which nothing was heard.
     - `now`: sentences, the most important first.
     - `asks`: the requester who waits for `fields`.
     - `story`: the events of the explained ride.
@@ -82,7 +83,7 @@ class Explanation:
     - `before`: a summary of the earlier events.
     """
 
-    kind: Explained
+    kind: Explained | Literal["device"]
     device: str
     heard: str
     now: tuple[str, ...]

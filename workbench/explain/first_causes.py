@@ -15,8 +15,8 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 
 TWO_NODES: Final = "TWO_NODES_FOR_ONE_DEVICE"
 BUS: Final = (
-    "check the bus or network, and the supply, cable and address of the module; on Modbus, look for"
-    " a second master on the line; `rmf-bridge log` shows each lost reply"
+    "check the bus, network or broker, and the supply, cable and address of the module; on Modbus, look"
+    " for a second master on the line; `rmf-bridge log` shows each lost reply"
 )
 FLICKERS: Final = (
     "find what kept changing: an input that flickers (check its wire and contact), or a relay module"

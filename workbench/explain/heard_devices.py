@@ -11,7 +11,7 @@ from dataclasses import replace
 from datetime import tzinfo
 from typing import ClassVar, Final
 
-from bridges.blackbox.triggers import DIED, REFUSED
+from bridges.blackbox.triggers import DIED, OPERATOR, REFUSED
 from bridges.kinds.charger import refusals
 from bridges.messages import definitions as d
 from bridges.messages import words
@@ -181,7 +181,8 @@ class HeardDevices(ObservedGraph[Device]):
         if reason is not None:
             answer.now.insert(0, reason.told(clock))
             _act_on(answer, reason, around.remedies)
-        if answer.because is None:
+        met = bool(answer.fields) and all(field.met for field in answer.fields)
+        if answer.because is None and not met:
             common.say_waits(answer, device, clock)
         answer.now[:0] = self.because(clock.time)
         if all(step.who == "nobody" for step in answer.next):
@@ -281,6 +282,8 @@ class HeardDevices(ObservedGraph[Device]):
             self._reason[note.subject] = reason = FileReason(*note.kept_for, moment)
             if reason.code != DIED:
                 self._due[note.subject] = moment.at + SHOWS_S
+        elif note.kept_for is not None and note.kept_for[0] == OPERATOR:
+            self._reason = {k: replace(v, wrote=note.kept_for[1]) for k, v in self._reason.items()}
         for kind in KINDS:
             if (kind, note.subject) in self.known:
                 self.known[kind, note.subject].note(moment, note)

@@ -87,7 +87,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L7.stopped",
         "DOOR_OPEN is shown only while the car stands",
-        "the car moves",
+        "a state says that the car goes up or down",
         "A robot drives by door, floor and session only; it does not read motion_state",
         REQUEST_LIFT,
         checks.stopped,

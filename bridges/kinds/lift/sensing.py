@@ -319,7 +319,8 @@ def _faults(senses: LiftSenses) -> tuple[Fault, ...]:
         found.append(
             Fault(
                 "POSITION_LOST",
-                f"the car cannot have reached {code[0]} from {senses.position.trusted}",
+                f"the floor code shows {code[0]}, but no ride there from"
+                f" {senses.position.trusted} was seen",
             )
         )
     for name, seen in zip(("door", "rear door"), senses.doors, strict=True):

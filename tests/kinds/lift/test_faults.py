@@ -30,7 +30,7 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     ),
     "a floor too far": (
         [(0.0, AT_L1), (0.1, replace(AT_L1, level="L3"))],
-        Fault("POSITION_LOST", "the car cannot have reached L3 from L1"),
+        Fault("POSITION_LOST", "the floor code shows L3, but no ride there from L1 was seen"),
     ),
     "a floor code that cannot be": (
         [(0.0, replace(AT_L1, level=None, code_fault="two lines at once"))],

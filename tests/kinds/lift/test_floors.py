@@ -36,7 +36,10 @@ def test_a_floor_code_that_jumps_over_a_floor_is_not_believed() -> None:
     story.run(5.0)
     assert story.state == "AGV, moving at ?, A to L1"
     assert story.node.status()["faults"] == [
-        {"code": "POSITION_LOST", "detail": "the car cannot have reached L3 from L1"}
+        {
+            "code": "POSITION_LOST",
+            "detail": "the floor code shows L3, but no ride there from L1 was seen",
+        }
     ]
     assert story.outputs == LiftOutputs(agv_request=True)
     story.building.set(level="L1")

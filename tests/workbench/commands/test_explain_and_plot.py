@@ -94,7 +94,9 @@ def test_a_device_that_was_not_heard_is_exit_1(
     bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run("explain", bag, "Lift2") == 1
-    assert "(did you mean Lift1?)" in " ".join(capsys.readouterr().out.split())
+    told = capsys.readouterr().out
+    assert told.startswith("device Lift2, heard from ")
+    assert "(did you mean Lift1?)" in " ".join(told.split())
 
 
 def test_a_recording_that_was_cut_is_explained_as_far_as_it_goes(

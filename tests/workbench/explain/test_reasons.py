@@ -93,7 +93,8 @@ def test_a_dead_daemons_file_is_about_its_death(kind: Kind) -> None:
     found = explained(kind, DIED, "killed")
     assert found.now[:2] == (
         "This file was kept because the daemon died: killed. The next sentences are about 08:00:20.",
-        "The daemon of bay7 died then. The file ends at its death, so what came after is unknown.",
+        "The daemon that wrote this file died then. The file ends at its death, so what came after is"
+        " unknown.",
     )
     assert (found.next[0].who, "rmf-bridge status" in found.next[0].what) == ("a person", True)
 
