@@ -23,7 +23,19 @@ def test_the_page_has_the_table() -> None:
     assert PAGE.read_text() == page()
 
 
-def test_every_output_of_every_kind_has_its_four_rows() -> None:
+ORDERS = {
+    "lift_supervisor.request",
+    "lift_supervisor.end",
+    "door_supervisor.open",
+    "door_supervisor.close",
+    "coordinator.request",
+    "coordinator.cancel",
+    "coordinator.assignment",
+}
+"""The messages by which a supervisor or the coordinator orders a device or robot."""
+
+
+def test_every_output_of_every_kind_and_every_order_has_its_four_rows() -> None:
     kinds = {
         "lift": LiftOutputs,
         "door": DoorOutputs,
@@ -31,7 +43,7 @@ def test_every_output_of_every_kind_has_its_four_rows() -> None:
         "dispenser": WorkcellOutputs,  # an ingestor has the same outputs
     }
     outputs = {f"{kind}.{field}" for kind, of in kinds.items() for field in of.__struct_fields__}
-    wanted = {f"{output}.{way}" for output in outputs - NO_COMMANDS for way in WAYS}
+    wanted = {f"{one}.{way}" for one in (outputs - NO_COMMANDS) | ORDERS for way in WAYS}
     assert wanted - {row.id for row in ROWS} == set()
 
 
