@@ -175,10 +175,10 @@ def steer(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
     doing = command.doing if command else ""
     by_others = memory.reading is not None and memory.reading.paused is True
     if must_stand(memory, now, limits):
-        if doing == "pause" or (still and (light.held or by_others)):
+        if still and doing != "pause" and (light.held or by_others):
             return memory
-        held = light.held or not by_others
-        return _begin(replace(memory, light=replace(light, held=held)), "pause", now)
+        memory = replace(memory, light=replace(light, held=light.held or not by_others))
+        return memory if doing == "pause" else _begin(memory, "pause", now)
     if not (light.held and still) or doing == "resume":
         return memory
     if not light.path or (light.answer and light.answer.says == "resume"):

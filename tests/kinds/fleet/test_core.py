@@ -189,6 +189,14 @@ def test_a_reset_for_another_robot_repeats_no_action() -> None:  # FLEET-12
     assert story.commands == [(0.0, "act 9, attempt 1")]
 
 
+def test_a_reset_begins_the_attempts_of_an_action_anew() -> None:  # FLEET-12
+    story = Story().see(completed="").order(Act(9, "clean")).see(60.0, refused="act is refused")
+    sent = story.see(refused="").commands
+    assert not story.report.fit
+    story.take(OperatorReset())
+    assert (story.report.fit, story.commands) == (True, sent)
+
+
 def test_a_stop_without_a_word_about_motion_is_believed_after_a_second_of_standing() -> None:
     story = driving(7)
     for x in range(1, 11):

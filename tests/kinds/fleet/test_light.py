@@ -260,6 +260,23 @@ def test_a_persons_pause_stays_a_persons_while_the_robot_still_rolls() -> None: 
     assert story.faults == ["ROBOT_PAUSED_BY_OTHERS"]
 
 
+def test_a_pause_that_goes_on_after_a_persons_pause_is_ours() -> None:  # FLEET-LIGHT-4
+    story = started()
+    says(story, "continue", 0).see(at=at(1.5), paused=True)
+    says(story, "stay", 0).see(SCAN_S, at=at(1.8), paused=False)
+    assert story.memory.light.held
+    story.see(SCAN_S, at=at(1.9), moving=False, paused=True)
+    says(story, "resume", 0)
+    assert story.commands[-1][1] == "resume 4, attempt 1"
+
+
+def test_a_reset_makes_no_pause_of_a_robot_that_drives() -> None:  # FLEET-LIGHT-4
+    story = started().take(OperatorReset())
+    says(story, "continue", 0).see(at=at(1.5), moving=False, paused=True)
+    says(story, "resume", 0)
+    assert story.memory.command is None
+
+
 def test_a_paused_robot_without_a_path_is_let_go() -> None:  # FLEET-LIGHT-4
     story = standing().see(paused=True).see(path=())
     assert story.commands[-1][1] == "resume 2, attempt 1"
@@ -293,4 +310,5 @@ def test_its_doing_names_path_checkpoint_light_and_pause() -> None:
 def test_a_robot_that_drives_without_a_path_is_told() -> None:
     story = standing(path=(), moving=True)
     assert story.faults == ["ROBOT_WITHOUT_PATH"]
-    assert story.memory.command is None
+    assert (story.memory.command, story.report.doing) == (None, "nothing")
+    assert standing(path=()).faults == []

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from bridges.kinds.fleet.places import off_line_m
 from bridges.kinds.fleet.signals import Localize, Pose
 from bridges.kinds.shared.decision import Fault, Suspended
 from tests.kinds.fleet.story import GRAPH, SITE, Story, at, driving, goal
@@ -129,4 +130,5 @@ def test_the_conversions_between_both_maps_are_inverse() -> None:
 def test_the_distance_from_the_graph_counts_lanes_and_lone_vertices() -> None:
     assert GRAPH.off_m(Pose("L1", 2.5, 2.0)) == 2.0
     assert GRAPH.off_m(Pose("L1", -3.0, 4.0)) == 5.0
+    assert off_line_m(here := Pose("L1", 1.0, 1.0), here, Pose("L1", 1.0, 3.0)) == 2.0
     assert GRAPH.off_m(Pose("L3", 0.0, 0.0)) == math.inf
