@@ -57,6 +57,4 @@ def forget(before: "Settled[T] | None", *, hazard: bool = False) -> "Settled[T] 
     """
     if before is None or (hazard and before.candidate is True):
         return before
-    if before.steady_at is None:
-        return None
     return replace(before, candidate=cast(T, before.value))

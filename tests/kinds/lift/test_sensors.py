@@ -23,7 +23,7 @@ from bridges.kinds.shared.decision import (
 from bridges.messages.definitions import LiftMode, LiftMotion
 from bridges.messages.stamps import in_seconds
 from tests.kinds.lift.alone import AT_L1, DEBOUNCE, Alone
-from tests.kinds.lift.story import OPEN_AT_L1, WALL, Building, Story, boarding
+from tests.kinds.lift.story import OPEN_AT_L1, SCAN_S, WALL, Building, Story, boarding
 
 # ---- LIFT-5: the open door, and inputs that contradict it
 
@@ -354,7 +354,16 @@ def test_a_gap_before_the_inputs_have_settled_restarts_their_debounce() -> None:
     assert story.faults == ["INPUTS_NOT_FRESH"]
     story.building.unreadable = ""
     story.run(1.0)
-    assert (story.faults, story.states[1:]) == ([], [(0.13, "AGV, open at L1")])
+    assert (story.faults, story.states[1:]) == ([], [(0.11, "AGV, open at L1")])
+
+
+def test_a_lift_that_never_settles_behind_a_flaky_bus_has_a_lasting_fault() -> None:
+    story = Story(Building(OPEN_AT_L1))
+    for scan in range(100):
+        story.building.unreadable = "timeout" if scan % 2 else ""
+        story._scan()
+        story.now += SCAN_S
+        assert story.faults == ["INPUTS_NOT_FRESH"] or story.now < 2.5
 
 
 def test_without_any_debounce_the_first_reading_counts() -> None:

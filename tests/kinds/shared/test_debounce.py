@@ -61,7 +61,8 @@ def test_after_a_gap_the_believed_value_stays_and_a_new_value_starts_again() -> 
     half = settle(steady, 2, 1.0, HOLD_S)
     assert forget(half) == Settled(1, 1, 1.0, steady_at=0.1, torn_since=1.0)
     assert forget(steady) == steady
-    assert forget(settle(None, 1, 0.0, HOLD_S)) is None
+    again = settle(forget(settle(None, 1, 0.0, HOLD_S)), 1, 5.0, HOLD_S)
+    assert again == Settled(None, 1, 5.0, torn_since=0.0), "it has kept changing since its start"
     assert forget(None) is None
 
 
