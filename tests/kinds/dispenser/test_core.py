@@ -132,6 +132,12 @@ def test_a_failed_reading_restarts_the_debounce_of_each_input() -> None:
     assert cell.outputs == ON
 
 
+def test_after_a_failed_reading_a_steady_input_counts_at_once() -> None:
+    cell = Cell(replace(STEADY, debounce={"ready": 0.5})).take(Sampled(CALM), at=10.0)
+    cell.take(Sampled(CALM), at=10.5).take(IoFailed("no"), at=10.6).take(Sampled(CALM), at=10.7)
+    assert cell.take(ASKS, MemoryKept(), MemoryKept()).outputs == ON
+
+
 # ---- DISPENSER-2: the core waits until a start is on the disk
 
 
