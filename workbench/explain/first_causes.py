@@ -50,6 +50,7 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
     **dict.fromkeys(
         (
             "DOOR_CONTACTS_CONTRADICT",
+            "DOOR_CONTACTS_UNSTEADY",
             "DOOR_CODE_ILLEGAL",
             "DOOR_CONTROLLER_FAULT",
             "DOOR_POSITION_UNKNOWN",

@@ -14,6 +14,7 @@ from bridges.kinds.door.memory import (
     travel_ends_at,
 )
 from bridges.kinds.door.sensing import BelievedDoor, released_by_fire
+from bridges.kinds.shared.debounce import RESTLESS_S
 from bridges.kinds.shared.decision import AlarmInputs, Fault
 from bridges.messages.definitions import DoorModeValue
 
@@ -134,6 +135,9 @@ def _contradictions(
 ) -> Iterator[Fault]:
     if view.seen and view.opened and view.closed:
         yield Fault("DOOR_CONTACTS_CONTRADICT", "the door reads open and closed")
+    if view.restless:
+        which = " and ".join(view.restless)
+        yield Fault("DOOR_CONTACTS_UNSTEADY", f"{which}: not steady within {RESTLESS_S:g} s")
     if view.lost:
         yield Fault("DOOR_POSITION_UNKNOWN", view.lost)
     if now >= travel_ends_at(memory, limits):

@@ -7,7 +7,8 @@ DOOR-SENSING-1. A change of an input counts when it has lasted for the signal's 
    hazard has settled once, a single reading of the hazard counts.
 DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown again, because the door
    may have moved. After a shorter gap the values stay, and a running debounce starts again. Only the
-   debounce of a hazard's begin goes on, so that a bus that fails again and again hides no hazard.
+   debounce of a hazard's begin goes on, so that a bus that fails again and again hides no hazard. If a
+   limit contact does not settle within its debounce and `RESTLESS_S`, the door's position is unknown.
 DOOR-SENSING-3. If the YAML sets `feedback: estimated`, a missing limit contact is estimated from the
    time for which the relay has been on or off. A failed read or write restarts that time.
 DOOR-SENSING-4. If a controller reports that it does not know the door's position (`lost`), the report
@@ -25,6 +26,7 @@ from bridges.kinds.shared.debounce import forget, settle
 from bridges.kinds.shared.durations import NEVER
 
 SIGNALS = ("opened", "closed", "obstruction", "fire")
+LIMITS = ("opened", "closed")
 HAZARDS = ("obstruction", "fire")
 
 
@@ -32,7 +34,8 @@ class BelievedDoor(msgspec.Struct, frozen=True):
     """The inputs as the core believes them at one instant.
 
     `fresh`: the last reading is younger than `stale_after_s`. `seen`: the reading is fresh and each
-    input has settled, so the door's position is known. `estimated`: the end positions that have no
+    input has settled, so the door's position is known. `restless`: the limit contacts that have kept
+    changing for too long. `estimated`: the end positions that have no
     contact. `changes_at`: the next time (s) when these values may change without a reading. `lost`,
     `errors`: see DoorSample.
     """
@@ -45,6 +48,7 @@ class BelievedDoor(msgspec.Struct, frozen=True):
     fire: bool
     estimated: frozenset[str]
     changes_at: float
+    restless: tuple[str, ...] = ()
     lost: str = ""
     errors: tuple[str, ...] = ()
 
@@ -93,17 +97,19 @@ def look(
     `held_since`."""
     opened, closed = _believed(senses.opened), _believed(senses.closed)
     opened_at, closed_at = _estimates(senses, held, held_since, limits)
-    guessed = frozenset(s for s in ("opened", "closed") if _unwired(getattr(senses, s)))
+    guessed = frozenset(s for s in LIMITS if _unwired(getattr(senses, s)))
     fresh = is_fresh(senses, now, limits)
+    restless = tuple(s for s in LIMITS if now >= _restless_at(senses, s, limits))
     return BelievedDoor(
         fresh=fresh,
-        seen=fresh and all(_settled(getattr(senses, signal)) for signal in SIGNALS),
+        seen=fresh and not restless and all(_settled(getattr(senses, s)) for s in SIGNALS),
         opened=opened or ("opened" in guessed and now >= opened_at and not closed),
         closed=closed or ("closed" in guessed and now >= closed_at and not opened),
         obstructed=_feared(senses.obstruction),
         fire=_feared(senses.fire),
         estimated=guessed,
         changes_at=min(_changes(senses, limits, now, opened_at, closed_at), default=NEVER),
+        restless=restless,
         lost=senses.lost,
         errors=senses.errors,
     )
@@ -128,6 +134,11 @@ def _unwired(contact: Contact | None) -> bool:
 
 def _settled(contact: Contact | None) -> bool:
     return contact is not None and contact.steady_at is not None
+
+
+def _restless_at(senses: DoorSenses, signal: str, limits: DoorLimits) -> float:
+    contact: Contact | None = getattr(senses, signal)
+    return NEVER if contact is None else contact.restless_at(limits.debounce.get(signal, 0.0))
 
 
 def _believed(contact: Contact | None) -> bool:
@@ -161,7 +172,7 @@ def _changes(
     """Yield the times (s) when the reading goes stale, when an estimate is due, and when a contact
     settles."""
     stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
-    due = [stale_at, *estimates]
+    due = [stale_at, *estimates, *(_restless_at(senses, s, limits) for s in LIMITS)]
     for signal in SIGNALS:
         contact: Contact | None = getattr(senses, signal)
         if contact is not None:

@@ -140,7 +140,8 @@ def obstacles(
     if memory.rival_at is not None:
         found.append(Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes this lift's states"))
     if not view.fresh:
-        found.append(Fault(NOT_FRESH, memory.io_fault or view.blind))
+        why = view.blind if view.restless else memory.io_fault or view.blind
+        found.append(Fault(NOT_FRESH, why))
     if now >= _unwritten_at(memory, limits):
         found.append(Fault("OUTPUTS_NOT_WRITTEN", memory.io_fault))
     return tuple(found)

@@ -33,12 +33,10 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 
 HAZARDS = tuple(Hazard)
 
+UNSTEADY = "not steady: "
+
 MOTION_MEMORY_S = 2.0
 """The time (s) after the car's last motion during which a new floor code is believed."""
-
-RESTLESS_S = 2.0
-"""The longest time (s), on top of the debounce, that an input may take to settle. An input that takes
-longer counts as restless, because of a loose wire or interference."""
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
@@ -81,6 +79,11 @@ class BelievedLift(msgspec.Struct, frozen=True):
     def fresh(self) -> bool:
         """Return whether the inputs can be believed."""
         return not self.blind
+
+    @property
+    def restless(self) -> bool:
+        """Return whether inputs keep changing, so that no input is believed."""
+        return self.blind.startswith(UNSTEADY) and not self.settling
 
     def door(self, side: Side) -> DoorSeen:
         """Return the door on that side. A side without wires is never open."""
@@ -289,8 +292,9 @@ def _unsettled(senses: LiftSenses, limits: LiftLimits) -> Iterator[Unsettled]:
 def _wait(name: str, seen: Settled[object] | None, hold_s: float, most_s: float) -> Unsettled:
     if seen is None or seen.torn_since is None:
         return Unsettled(name, AGES_AGO, AGES_AGO)
-    torn_at = seen.torn_since + most_s + RESTLESS_S
-    return Unsettled(name, seen.due_at(hold_s), torn_at, new=seen.steady_at is None)
+    return Unsettled(
+        name, seen.due_at(hold_s), seen.restless_at(most_s), new=seen.steady_at is None
+    )
 
 
 def _blind(
@@ -301,7 +305,7 @@ def _blind(
     if now >= stale_at(senses, limits):
         return f"no reading for {limits.t.stale_after_s:g} s"
     torn = [wait.name for wait in unsettled if wait.new or now >= wait.torn_at]
-    return f"not steady: {', '.join(torn)}" if torn else ""
+    return f"{UNSTEADY}{', '.join(torn)}" if torn else ""
 
 
 def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:

@@ -4,12 +4,17 @@ The functions are pure and work on readings. So GPIO pins and polled Modbus inpu
 functions. gpiozero's own debounce is not used, because it drops edges and gpiozero's mock pins lack it.
 """
 
-from typing import Generic, TypeVar, cast
+from typing import Final, Generic, TypeVar, cast
 
 import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.shared.durations import NEVER
+
+RESTLESS_S: Final = 2.0
+"""The longest time (s), on top of the debounce, that an input may take to settle. An input that takes
+longer counts as restless, because of a loose wire, interference, or a bus that fails again and
+again."""
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -34,6 +39,11 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
         """Return the time when the candidate will count if it lasts; inf if it already counts."""
         return NEVER if self.torn_since is None else self.since + hold_s
 
+    def restless_at(self, hold_s: float) -> float:
+        """Return the time when the input counts as restless if it does not settle before; inf if it has
+        settled."""
+        return NEVER if self.torn_since is None else self.torn_since + hold_s + RESTLESS_S
+
 
 def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":
     """Add one reading. A value counts after it was read for `hold_s` seconds. With `hold_s` 0 every
@@ -50,7 +60,8 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
 
 def forget(before: "Settled[T] | None", *, hazard: bool = False) -> "Settled[T] | None":
     """Keep the value after a gap in the readings, and restart the candidate's debounce. The time for
-    which readings have kept changing goes on.
+    which readings have kept changing goes on. An input that reads None is not wired, so its debounce
+    need not restart.
 
     The debounce of a `hazard` that was read goes on. Otherwise a bus that fails again and again would
     hide the hazard for as long as it fails.

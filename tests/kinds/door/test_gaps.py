@@ -102,6 +102,22 @@ def test_a_bus_that_fails_at_every_second_reading_hides_no_hazard(hazard: str) -
     assert getattr(core.memory.senses, hazard).value is True
 
 
+def test_a_door_behind_a_bus_that_fails_at_every_second_reading_is_not_shown_open_for_long() -> (
+    None
+):
+    core = CoreAlone(DoorLimits(debounce={"opened": 0.5, "closed": 0.5}))
+    core.hears(OPENS)
+    core.sees(OPEN, until=2.0)
+    while core.now < 6.0:
+        core.hears(IoFailed("no reply"))
+        core.sees(CLOSED, until=core.now + 0.125)
+    assert core.told[-2:] == [(0.5, "OPEN", True), (4.5, "UNKNOWN", True)]
+    assert core.faults() == ("DOOR_CONTACTS_UNSTEADY: opened and closed: not steady within 2 s",)
+    core.sees(CLOSED, until=6.75)
+    assert core.told[-1][1] == "CLOSED"
+    assert "DOOR_CONTACTS_UNSTEADY" not in str(core.faults())
+
+
 def test_after_one_reading_and_a_gap_the_position_of_a_door_is_unknown() -> None:
     core = CoreAlone()
     core.hears(IoFailed("no reply"))

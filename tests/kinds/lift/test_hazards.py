@@ -529,7 +529,7 @@ def test_the_core_wakes_when_another_node_has_gone() -> None:
 
 def test_a_bus_that_fails_at_every_second_reading_hides_no_hazard() -> None:
     """LIFT-SENSING-2."""
-    lift = Alone(stale_after_s=1.0)(0.5, AT_L1)(1.0, AT_L1)
+    lift = Alone(DEBOUNCE, stale_after_s=1.0)(0.5, AT_L1)(1.0, AT_L1)
     fire = replace(AT_L1, hazards=frozenset({Hazard.FIRE}))
     for now in (1.1, 1.2, 1.3, 1.4):
         lift(now, IoFailed("no reply"))(now + 0.05, fire)
