@@ -46,7 +46,8 @@ def death(entries: Sequence[AnyEntry]) -> Note | None:
     told = [entry.reason for entry in entries if isinstance(entry, DaemonDied)]
     last = entries[-1]
     if isinstance(last, DaemonEnded):
-        told.append("the daemon ended, and not every output was verified off")
+        off = "every output" if last.safe else "not every output"
+        told.append(f"the daemon ended, and {off} was verified off")
     told.append("the daemon left no last entry: it was killed, or the machine stopped")
     return Note(last.at, DIED, told[0])
 

@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 import time
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from bridges.runtime import holder
 from bridges.runtime.clock import machine_s
 from bridges.runtime.runtime_directory import find
 from bridges.settings.load import SettingsError
+from bridges.system.directories import Directories
 from bridges.system.installed import of_workbench
 from bridges.system.written import no_folder, not_written
 
@@ -60,8 +62,7 @@ def run(args: argparse.Namespace) -> int:
         return not_written(path, why)
     try:
         places = find(args.file.absolute(), args.runtime_dir)
-        follows = not args.died and holder.look(places) is not None
-        incident = _incident(places.runtime / (DIED if args.died else NAME), args, follows)
+        incident = _incident(places, args)
     except (PermissionError, RingError) as error:
         print(f"{error}. {_hint(died=args.died)}", file=sys.stderr)
         return os.EX_UNAVAILABLE
@@ -92,25 +93,38 @@ def _hint(*, died: bool) -> str:
     return "Does the daemon run, and does the YAML keep a ring?"
 
 
-def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
-    """Return the last 120 s of the daemon.
-
-    If `follows` is True, the daemon runs. Then wait, and add the later events. Otherwise the ring's run
-    is over. Raises RingError.
-    """
+def _incident(places: Directories, args: argparse.Namespace) -> Incident:
+    """Return the last 120 s of the daemon. If the daemon runs, wait, and add the later events. Raises
+    PermissionError and RingError."""
+    died, ring = places.runtime / DIED, places.runtime / NAME
+    if args.died:
+        return _over(RingContent(died), args.note)
     before, at = RingContent(ring), machine_s()
-    if not follows:
-        if not args.died:
-            print(f"no daemon serves {args.file} now, so no later events will come")
+    _tell_of_death(died)
+    if not _serves(places):
+        print(f"no daemon serves {args.file} now, so no later events will come")
         return _over(before, args.note)
-    _tell_of_death(ring.with_name(DIED))
     _wait(args.after)
-    try:
-        after = RingContent(ring)
-    except RingError:
-        after = before
+    after = _of_run(before, ring, died)
+    if after is None or not _serves(places):
+        return _over(after or before, args.note)
     note, entries = Note(at, OPERATOR, args.note), list(after.entries())
     return Incident(after.head, part(entries, at - BEFORE_S, at + AFTER_S), (note,))
+
+
+def _serves(places: Directories) -> bool:
+    found = holder.look(places)
+    return found is not None and found.serves
+
+
+def _of_run(before: RingContent, *rings: Path) -> RingContent | None:
+    """Return the present content of the ring of this run. Return None if the ring is gone."""
+    for ring in rings:
+        with suppress(RingError):
+            found = RingContent(ring)
+            if found.head.run == before.head.run:
+                return found
+    return None
 
 
 def _over(ring: RingContent, text: str) -> Incident:
@@ -125,11 +139,12 @@ def _over(ring: RingContent, text: str) -> Incident:
 
 def _tell_of_death(ring: Path) -> None:
     """Say that an earlier run died, because the present run's ring does not show that run."""
-    try:
+    with suppress(OSError):
         ended = datetime.fromtimestamp(ring.stat().st_mtime)
-    except OSError:
-        return
-    print(f"an earlier run died at {ended:%Y-%m-%d %H:%M:%S}; --died records its last minutes")
+        print(
+            f"an earlier run did not shut down cleanly (it ended at {ended:%Y-%m-%d %H:%M:%S});"
+            " --died records its last minutes"
+        )
 
 
 def _wait(seconds: float) -> None:

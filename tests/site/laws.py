@@ -379,8 +379,8 @@ class Laws:
         sighted = not self._ills.has(name, "bus")
         sick = self._hazard_since(name) + AT_ONCE_S < now
         self.require(not (sighted and sick), f"{name} drives {sorted(on)} under a hazard")
-        # A session may end before a state shows its end, and its END may arrive late, above all after
-        # the lift was cut off. So the grace period begins at the latest of these times.
+        # A session may end before a state shows its end, and a request or END may arrive late, above
+        # all after the lift was cut off. So the grace period begins at the latest of these times.
         found_again = self._ills.since_over(name, "cut off")
         ended = (at + LATEST_S for at in (found_again, *truth.ended.values()))
         since = max(truth.since, self._ills.since_over(name, "bus"), *ended)

@@ -142,14 +142,16 @@ def _one(site: HeardDevices, args: argparse.Namespace) -> int:
         several = " and a ".join(kinds)
         complain("explain", f"'{name}' is a {several}: choose with --kind")
         return 2
-    found = _explained(site, kinds[0], name)
+    found = _explained(site, kinds[0], name, args.kind)
     _tell(found, as_json=args.json)
     return 0 if site.robot(name) or (kinds[0], name) in site.devices() else 1
 
 
-def _explained(site: HeardDevices, kind: Explained, name: str) -> Explanation:
+def _explained(
+    site: HeardDevices, kind: Explained, name: str, given: Explained | None
+) -> Explanation:
     found = site.explain(kind, name, None, faults.for_explain())
-    return found if site.kinds(name) else replace(found, kind="device")
+    return found if given or site.kinds(name) else replace(found, kind="device")
 
 
 def _tell(found: Explanation, *, as_json: bool) -> None:
@@ -196,7 +198,7 @@ def _follow(ear: Ear, past: Ear, site: HeardDevices, args: argparse.Namespace) -
     _listen(ear, past, site, args.for_s)
     while True:
         kinds: list[Explained] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
-        found = _explained(site, kinds[0], args.live)
+        found = _explained(site, kinds[0], args.live, args.kind)
         news = [SECONDS.sub("", text) for text in found.now], found.next
         if news != told:
             _tell(found, as_json=args.json)

@@ -153,8 +153,8 @@ def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer |
             "The daemon that wrote this file died then. The file ends at its death, so what came after"
             " is unknown.",
             "a person",
-            "see whether that daemon runs again and its relays are off (`rmf-bridge status`), and why"
-            " it died (`rmf-bridge log`, the journal)",
+            "see whether that daemon runs again, and whether its relays, if it has any, are off"
+            " (`rmf-bridge status`); then why it died (`rmf-bridge log`, the journal)",
         )
     if last is None or not device.is_silent(clock.now):
         return None

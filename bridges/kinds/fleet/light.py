@@ -15,9 +15,11 @@ FLEET-LIGHT-3. If a robot stands less than `pauses_m` before a granted checkpoin
    at that checkpoint. RMF never hears that the robot has reached a checkpoint that RMF has not granted,
    unless the robot has really passed it.
 FLEET-LIGHT-4. A robot is resumed only if we have paused it, because a person may have paused it too. A
-   robot that reports a pause before ours counts as paused by others, even while it still rolls. It is
-   resumed only if RMF says so or if its path is over. After an operator's reset, a paused robot counts
-   as paused by us. `keep.py` saves on disk which robots we have paused.
+   robot that reports a pause before ours counts as paused by others, even while it still rolls. If it
+   then reports that it is not paused, and ours goes on, it counts as paused by us. It is resumed only
+   if RMF says so or if its path is over. A resume that it has not obeyed yet is replaced by a pause if
+   it must stand. After an operator's reset, a paused robot counts as paused by us. `keep.py` saves on
+   disk which robots we have paused.
 FLEET-LIGHT-5. If RMF answers with an error and the robot stands, RMF gets the path again, beginning at
    the robot's present place.
 """
@@ -173,11 +175,12 @@ def steer(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
     """Begin a pause or a resume if one is due."""
     light, command, still = memory.light, memory.command, stands(memory, now)
     doing = command.doing if command else ""
-    by_others = memory.reading is not None and memory.reading.paused is True
+    paused = memory.reading.paused if memory.reading else None
     if must_stand(memory, now, limits):
-        if still and doing != "pause" and (light.held or by_others):
+        if doing != "resume" and still and (light.held or paused):
             return memory
-        memory = replace(memory, light=replace(light, held=light.held or not by_others))
+        ours = light.held or (paused is False if doing == "pause" else not paused)
+        memory = replace(memory, light=replace(light, held=ours))
         return memory if doing == "pause" else _begin(memory, "pause", now)
     if not (light.held and still) or doing == "resume":
         return memory

@@ -95,7 +95,7 @@ def _doing(memory: RobotMemory) -> str:
 def _light(memory: RobotMemory, limits: RobotLimits) -> str:
     light, command = memory.light, memory.command
     told = command is not None and command.doing == "pause"
-    paused = ("told to pause" if told else "paused by us") if light.held else ""
+    paused = "told to pause" if told else "paused by us" if light.held else ""
     if not light.path:
         return paused or "nothing"
     to = light.path[-1]
@@ -140,7 +140,8 @@ def _of_light(memory: RobotMemory, now: float) -> Iterator[Fault]:
     light, reading = memory.light, memory.reading
     assert reading is not None
     if reading.paused and not light.held:
-        yield Fault("ROBOT_PAUSED_BY_OTHERS", "it is paused, and we have not paused it")
+        text = "somebody else paused it first, and we resume only our own pauses"
+        yield Fault("ROBOT_PAUSED_BY_OTHERS", text)
     if light.answer is not None and light.answer.says == "error":
         yield Fault("ROBOT_PASSED_LIGHT", "it is where RMF has not let it go")
     if not light.path and not reading.path and not stands(memory, now) and memory.fresh:

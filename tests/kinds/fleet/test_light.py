@@ -270,6 +270,24 @@ def test_a_pause_that_goes_on_after_a_persons_pause_is_ours() -> None:  # FLEET-
     assert story.commands[-1][1] == "resume 4, attempt 1"
 
 
+def test_a_pause_that_one_state_leaves_out_stays_a_persons() -> None:  # FLEET-LIGHT-4
+    story = started()
+    says(story, "continue", 0).see(at=at(1.5), paused=True)
+    says(story, "stay", 0).see(SCAN_S, at=at(1.6), paused=None)
+    assert not story.memory.light.held
+
+
+@pytest.mark.parametrize("told", [PATH, (at(3.0), at(3.0, 4.0))])
+def test_a_resume_that_was_not_obeyed_is_taken_back(told: tuple[Pose, ...]) -> None:
+    """FLEET-LIGHT-4: RMF says `stay`, or the path is another one."""
+    story = standing().see(paused=True)
+    says(story, "resume", 0).see(1.0)
+    says(story.see(path=told), "stay", 0)
+    assert story.commands[-1][1] == "pause 3, attempt 1"
+    says(story.see(20.0), "resume", 0, story.memory.light.number)
+    assert story.commands[-1][1] == "resume 4, attempt 1"
+
+
 def test_a_reset_makes_no_pause_of_a_robot_that_drives() -> None:  # FLEET-LIGHT-4
     story = started().take(OperatorReset())
     says(story, "continue", 0).see(at=at(1.5), moving=False, paused=True)

@@ -59,7 +59,7 @@ def _typed(site: Site, *words: str) -> str:
         for module in (explain, send):
             patch.setattr(module, "open_graph", joined)
         patch.setattr(incident, "machine_s", time.monotonic)
-        patch.setattr(incident.holder, "look", lambda places: True)  # the site's daemons run
+        patch.setattr(incident, "_serves", lambda places: True)  # the site's daemons run
         patch.setattr(live, "SimpleQueue", partial(_Queue, site.timeline))
         cli.main(list(words))
     return told.getvalue()
