@@ -52,6 +52,8 @@ ONE_BY_ONE: dict[str, Any] = {
 }
 MILLIMETRES = msgspec.convert({"api": ONE_BY_ONE}, HttpRobotSettings)
 START = Pose("L1", 1.0, 2.0, 0.5)
+TIMEOUT_S = 1.0
+"""Long enough for a busy machine."""
 
 
 @dataclass
@@ -80,9 +82,9 @@ def fleet(settings: HttpRobotSettings, *names: str) -> Iterator[Bench]:
     plants = {name: RobotPlant(name, START, parts=PARTS) for name in names or ("AMR01",)}
     world = RealTime(dict(plants))
     stations = [FakeFleetRobot(name, world.plants[name], settings) for name in plants]
-    server = HttpServer(stations, "/api", 0.3)
+    server = HttpServer(stations, "/api", TIMEOUT_S)
     base, clock = str(server.replace["api_base"]), Time()
-    bus = http.HttpBus(http.HttpSettings(api_base=base, timeout_s=0.3), lambda: clock.now)
+    bus = http.HttpBus(http.HttpSettings(api_base=base, timeout_s=TIMEOUT_S), lambda: clock.now)
     try:
         drivers = {name: HttpRobot(name, settings, bus) for name in plants}
         yield Bench(plants, drivers, bus, clock)
