@@ -105,11 +105,15 @@ def _incident(places: Directories, args: argparse.Namespace) -> Incident:
         print(f"no daemon serves {args.file} now, so no later events will come")
         return _over(before, args.note)
     _wait(args.after)
-    after = _of_run(before, ring, died)
-    if after is None or not _serves(places):
-        return _over(after or before, args.note)
-    note, entries = Note(at, OPERATOR, args.note), list(after.entries())
-    return Incident(after.head, part(entries, at - BEFORE_S, at + AFTER_S), (note,))
+    after = _of_run(before, ring)
+    if after is None:
+        dead = _of_run(before, died)
+    else:
+        dead = None if _serves(places) else after
+    if dead is not None:
+        return _over(dead, args.note)
+    note, entries = Note(at, OPERATOR, args.note), list((after or before).entries())
+    return Incident(before.head, part(entries, at - BEFORE_S, at + AFTER_S), (note,))
 
 
 def _serves(places: Directories) -> bool:
@@ -117,13 +121,12 @@ def _serves(places: Directories) -> bool:
     return found is not None and found.serves
 
 
-def _of_run(before: RingContent, *rings: Path) -> RingContent | None:
-    """Return the present content of the ring of this run. Return None if the ring is gone."""
-    for ring in rings:
-        with suppress(RingError):
-            found = RingContent(ring)
-            if found.head.run == before.head.run:
-                return found
+def _of_run(before: RingContent, ring: Path) -> RingContent | None:
+    """Return the present content of this file if it is the ring of the same run."""
+    with suppress(RingError):
+        found = RingContent(ring)
+        if found.head.run == before.head.run:
+            return found
     return None
 
 

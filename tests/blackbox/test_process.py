@@ -16,6 +16,7 @@ import pytest
 from bridges import cli
 from bridges.blackbox.entries import Spoken
 from bridges.blackbox.ring import RingContent
+from bridges.commands import incident
 from hal_fakes.wire import wire
 from tests.runtime.site import daemon, environment, shipped
 from tests.waiting import PATIENCE_S, wait_until
@@ -117,9 +118,10 @@ def test_an_incident_of_a_killed_daemon_is_about_its_death(
     place = tmp_path / "run"
     where = ("--runtime-dir", str(place))
     served = (lift, place, "--simulate", "--domain-id", str(domain))
-    with daemon(*served) as running:
+    with daemon(*served) as running, pytest.MonkeyPatch.context() as patch:
         wait_until(lambda: states(place) > 2, "states are in the ring")
-        running.end(signal.SIGKILL)
+        patch.setattr(incident, "_wait", lambda seconds: running.end(signal.SIGKILL))
+        hung = bridge("incident", lift, "-o", "hung.mcap", *where)
     dead = bridge("incident", lift, "--note", "it stood", "-o", "dead.mcap", *where)
     with daemon(*served) as running:
         wait_until((place / "ring.died").exists, "the dead run's ring is put aside")
@@ -128,12 +130,17 @@ def test_an_incident_of_a_killed_daemon_is_about_its_death(
         running.end(signal.SIGTERM)
     codes = {
         name: [note.code for note in notes_in(tmp_path / f"{name}.mcap")]
-        for name in ("dead", "now", "died")
+        for name in ("hung", "dead", "now", "died")
     }
     told = bridge("explain", tmp_path / "dead.mcap").stdout
 
-    assert (dead.returncode, now.returncode, died.returncode) == (0, 0, 0)
-    assert codes == {"dead": ["DIED", "OPERATOR"], "now": ["OPERATOR"], "died": ["DIED"]}
+    assert [one.returncode for one in (hung, dead, now, died)] == [0, 0, 0, 0]
+    assert codes == {
+        "hung": ["DIED"],
+        "dead": ["DIED", "OPERATOR"],
+        "now": ["OPERATOR"],
+        "died": ["DIED"],
+    }
     assert now.stdout.startswith("an earlier run did not shut down cleanly (it ended at ")
     assert died.stdout.startswith("died.mcap: ")
     assert "This file was kept because the daemon died" in told
