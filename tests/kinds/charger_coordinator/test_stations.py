@@ -227,6 +227,12 @@ def test_a_station_without_hope_must_release_the_robot_which_keeps_its_place_in_
     assert stations.in_time(memory, at_, SITE) == let_go
 
 
+def test_an_unreachable_station_that_shows_no_request_keeps_its_charging_robot() -> None:
+    """COORDINATOR-STATIONS-4: its restarted daemon does not know whether the charge goes on."""
+    charging = site(grants={A: replace(GRANT, started=True)})
+    assert after(charging, ERROR, LOST, request_id="") == charging
+
+
 def test_a_robot_that_stays_away_is_given_up() -> None:
     memory = site(stations={A: shows(ASSIGNED, heard=69.0)})
     assert stations.in_time(memory, 69.9, SITE) == memory
