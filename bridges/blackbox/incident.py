@@ -47,6 +47,12 @@ def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequenc
     return [entry for entry in entries[first:] if entry.at <= end_at]
 
 
+def of_end(head: Head, entries: Sequence[AnyEntry], notes: tuple[Note, ...]) -> Incident:
+    """Return the last BEFORE_S of a run that is over."""
+    at = entries[-1].at if entries else 0.0
+    return Incident(head, part(entries, at - BEFORE_S, at), notes)
+
+
 def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]]:
     """Yield each entry with two times (s since the epoch). The first of the two never jumps. The second
     is the wall clock's time, which jumps when somebody sets that clock."""

@@ -16,7 +16,7 @@ from typing import Final
 
 from bridges.blackbox import days
 from bridges.blackbox.entries import AnyEntry, Clocks, Head, Known
-from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, part
+from bridges.blackbox.incident import AFTER_S, BEFORE_S, Incident, Note, of_end, part
 from bridges.blackbox.recordings import CONTINUOUS, DEATH, Recordings, reason
 from bridges.blackbox.ring import DIED as DIED_NAME
 from bridges.blackbox.ring import NAME, RingContent, RingError, Tail
@@ -135,8 +135,7 @@ class Recorder:
         entries = list(read.entries())
         died = None if read.ended else death(entries)
         if died is not None and self._is_first(read.head):
-            lasted = part(entries, died.at - BEFORE_S, died.at)
-            self._put(Incident(read.head, lasted, (died,)), DEATH)
+            self._put(of_end(read.head, entries, (died,)), DEATH)
 
     def _is_first(self, head: Head) -> bool:
         """Return whether this run's death must be recorded. Return False if it is recorded already, or

@@ -8,7 +8,7 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note, part
+from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note, of_end, part
 from bridges.blackbox.ring import DIED, NAME, RingContent, RingError
 from bridges.blackbox.triggers import OPERATOR, death
 from bridges.runtime import holder
@@ -133,11 +133,10 @@ def _of_run(before: RingContent, ring: Path) -> RingContent | None:
 def _over(ring: RingContent, text: str) -> Incident:
     """Return the last 120 s of a run that is over. If the run died, its death is the first reason."""
     entries = list(ring.entries())
-    at = entries[-1].at if entries else 0.0
     died = None if ring.ended else death(entries)
-    note = Note(at, OPERATOR, text)
+    note = Note(entries[-1].at if entries else 0.0, OPERATOR, text)
     notes = (note,) if died is None else (died, note) if text else (died,)
-    return Incident(ring.head, part(entries, at - BEFORE_S, at), notes)
+    return of_end(ring.head, entries, notes)
 
 
 def _tell_of_death(ring: Path) -> None:

@@ -137,21 +137,21 @@ def _all(site: HeardDevices, devices: list[tuple[Explained, str]], *, as_json: b
 def _one(site: HeardDevices, args: argparse.Namespace) -> int:
     """Print the explanation of the named device. Without a name, explain the only device."""
     name = args.device or args.live or site.devices()[0][1]
-    kinds: list[Explained] = [args.kind] if args.kind else site.kinds(name) or ["lift"]
-    if len(kinds) > 1:
+    kinds = site.kinds(name)
+    if len(kinds) > 1 and not args.kind:
         several = " and a ".join(kinds)
         complain("explain", f"'{name}' is a {several}: choose with --kind")
         return 2
-    found = _explained(site, kinds[0], name, args.kind)
+    found = _explained(site, args.kind, name)
     _tell(found, as_json=args.json)
-    return 0 if site.robot(name) or (kinds[0], name) in site.devices() else 1
+    return 0 if site.robot(name) or (found.kind, name) in site.devices() else 1
 
 
-def _explained(
-    site: HeardDevices, kind: Explained, name: str, given: Explained | None
-) -> Explanation:
-    found = site.explain(kind, name, None, faults.for_explain())
-    return found if given or site.kinds(name) else replace(found, kind="device")
+def _explained(site: HeardDevices, given: Explained | None, name: str) -> Explanation:
+    """Explain the device. `given`: its kind, if the user has named it."""
+    known = [given] if given else site.kinds(name)
+    found = site.explain(known[0] if known else "lift", name, None, faults.for_explain())
+    return found if known else replace(found, kind="device")
 
 
 def _tell(found: Explanation, *, as_json: bool) -> None:
@@ -197,8 +197,7 @@ def _follow(ear: Ear, past: Ear, site: HeardDevices, args: argparse.Namespace) -
     told: object = None
     _listen(ear, past, site, args.for_s)
     while True:
-        kinds: list[Explained] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
-        found = _explained(site, kinds[0], args.live, args.kind)
+        found = _explained(site, args.kind, args.live)
         news = [SECONDS.sub("", text) for text in found.now], found.next
         if news != told:
             _tell(found, as_json=args.json)

@@ -42,11 +42,7 @@ def decide(
         case Sampled(sample):
             memory = _read(memory, sample, now, limits)
         case IoFailed(reason):
-            kept = {
-                name: one
-                for name, old in memory.sources.items()
-                if (one := forget(old, hazard=True))
-            }
+            kept = {name: forget(old, hazard=True) for name, old in memory.sources.items()}
             memory = replace(memory, io_fault=reason, sources=kept, drill=forget(memory.drill))
     wake_at = min((at for at in _wakes(memory, now, limits) if at > now), default=NEVER)
     return Decision(memory, PanelOutputs(), _report(memory, now, limits), wake_at)

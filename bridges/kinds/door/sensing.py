@@ -35,9 +35,8 @@ class BelievedDoor(msgspec.Struct, frozen=True):
 
     `fresh`: the last reading is younger than `stale_after_s`. `seen`: the reading is fresh and each
     input has settled, so the door's position is known. `restless`: the limit contacts that have kept
-    changing for too long. `estimated`: the end positions that have no
-    contact. `changes_at`: the next time (s) when these values may change without a reading. `lost`,
-    `errors`: see DoorSample.
+    changing for too long. `estimated`: the end positions that have no contact. `changes_at`: the next
+    time (s) when these values may change without a reading. `lost`, `errors`: see DoorSample.
     """
 
     fresh: bool

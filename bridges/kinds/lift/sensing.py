@@ -33,8 +33,6 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 
 HAZARDS = tuple(Hazard)
 
-UNSTEADY = "not steady: "
-
 MOTION_MEMORY_S = 2.0
 """The time (s) after the car's last motion during which a new floor code is believed."""
 
@@ -57,13 +55,15 @@ class BelievedLift(msgspec.Struct, frozen=True):
     """The inputs as the core believes them at one instant.
 
     `blind`: the reason why no input is believed, "" if all inputs are believed. `settling`: some inputs
-    have not settled since the start, and no input is restless. `level`: the landing, None when unknown.
-    `level_settles`: the floor code is changing. `agv`: None if not wired. `changes_at`: the next time
-    (s) when these values may change without a reading.
+    have not settled since the start, and no input is restless. `restless`: an input keeps changing, so
+    no input is believed. `level`: the landing, None when unknown. `level_settles`: the floor code is
+    changing. `agv`: None if not wired. `changes_at`: the next time (s) when these values may change
+    without a reading.
     """
 
     blind: str
     settling: bool
+    restless: bool
     level: str | None
     level_settles: bool
     stopped: bool
@@ -79,11 +79,6 @@ class BelievedLift(msgspec.Struct, frozen=True):
     def fresh(self) -> bool:
         """Return whether the inputs can be believed."""
         return not self.blind
-
-    @property
-    def restless(self) -> bool:
-        """Return whether inputs keep changing, so that no input is believed."""
-        return self.blind.startswith(UNSTEADY) and not self.settling
 
     def door(self, side: Side) -> DoorSeen:
         """Return the door on that side. A side without wires is never open."""
@@ -132,7 +127,7 @@ def gap(senses: LiftSenses, now: float) -> LiftSenses:
         (forget(senses.doors[0]), forget(senses.doors[1])),
         forget(senses.motion),
         forget(senses.agv),
-        {h: s for h, old in senses.hazards.items() if (s := forget(old, hazard=True))},
+        {h: forget(old, hazard=True) for h, old in senses.hazards.items()},
         replace(senses.position, moved_at=now),
     )
 
@@ -160,12 +155,14 @@ def look(senses: LiftSenses, now: float, limits: LiftLimits) -> BelievedLift:
     code = senses.code.value if senses.code else None
     hazards = frozenset(h for h, s in senses.hazards.items() if s.value)
     unsettled = tuple(_unsettled(senses, limits))
+    torn = any(now >= wait.torn_at for wait in unsettled)
     due = [stale_at(senses, limits), front.settles_at, rear.settles_at if rear else NEVER]
     for wait in unsettled:
         due += [wait.due_at, wait.torn_at]
     return BelievedLift(
         blind=_blind(senses, unsettled, now, limits),
-        settling=_settling(unsettled, now),
+        settling=any(wait.new for wait in unsettled) and not torn,
+        restless=torn and not stale,
         level=code[0] if code and code[0] == senses.position.trusted else None,
         level_settles=senses.code is not None and senses.code.candidate != senses.code.value,
         stopped=_stands(senses.motion),
@@ -305,13 +302,7 @@ def _blind(
     if now >= stale_at(senses, limits):
         return f"no reading for {limits.t.stale_after_s:g} s"
     torn = [wait.name for wait in unsettled if wait.new or now >= wait.torn_at]
-    return f"{UNSTEADY}{', '.join(torn)}" if torn else ""
-
-
-def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
-    """Return whether some input has not settled since the start, and no input is restless."""
-    first = any(wait.new for wait in unsettled)
-    return first and not any(now >= wait.torn_at for wait in unsettled)
+    return f"not steady: {', '.join(torn)}" if torn else ""
 
 
 def _faults(senses: LiftSenses) -> tuple[Fault, ...]:

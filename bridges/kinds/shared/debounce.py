@@ -4,7 +4,7 @@ The functions are pure and work on readings. So GPIO pins and polled Modbus inpu
 functions. gpiozero's own debounce is not used, because it drops edges and gpiozero's mock pins lack it.
 """
 
-from typing import Final, Generic, TypeVar, cast
+from typing import Any, Final, Generic, TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -58,7 +58,10 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
     return Settled(seen, seen, before.since, steady_at=now)
 
 
-def forget(before: "Settled[T] | None", *, hazard: bool = False) -> "Settled[T] | None":
+S = TypeVar("S", bound="Settled[Any] | None")
+
+
+def forget(before: S, *, hazard: bool = False) -> S:
     """Keep the value after a gap in the readings, and restart the candidate's debounce. The time for
     which readings have kept changing goes on. An input that reads None is not wired, so its debounce
     need not restart.
@@ -68,4 +71,4 @@ def forget(before: "Settled[T] | None", *, hazard: bool = False) -> "Settled[T] 
     """
     if before is None or (hazard and before.candidate is True):
         return before
-    return replace(before, candidate=cast(T, before.value))
+    return replace(before, candidate=before.value)
