@@ -47,7 +47,8 @@ VIOLATIONS = {"resultTypes": ["violations"]}
 
 class Graph:
     """A node that publishes the states of all devices of a site. `turn` publishes these states, at most
-    once a second."""
+    once a second. A device that a test takes out of it is silent, and so something that is wrong, in
+    each later test of the module."""
 
     def __init__(self, domain: int, transport: Transport | None = None) -> None:
         self.options = on_graph(domain)

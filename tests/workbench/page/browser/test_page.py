@@ -71,7 +71,6 @@ def test_a_name_from_the_graph_is_shown_as_text(
     until(lambda: tab.locator("h1", has_text=HOSTILE).count() == 1, "its own page")
     assert tab.locator("main img").count() == 0
     assert tab.title() != "1"
-    del graph.lifts[HOSTILE]
 
 
 def test_the_timeline_of_a_device_grows(
