@@ -162,6 +162,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
             if isinstance(event, OperatorReset):  # claim a failed device again at the next scan
                 self._open = self._open and not self._io_fault
             self._decide(event)
+        if self._kind.keeping is not None and self._kind.keeping.outputs_first:
+            self._write()
         self._keep()
         self._write()
 

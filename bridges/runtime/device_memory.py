@@ -1,4 +1,4 @@
-"""The memories of a daemon's devices that must survive a restart. All devices of a daemon share one
+"""The memories of a daemon's devices, and of its alarm, that must survive a restart. They share one
 file.
 
 A device's thread first writes the device's memory to the file. Only then does the thread switch an
@@ -23,6 +23,8 @@ log = logging.getLogger(__name__)
 
 VERSION: Final = 1
 NO_FILE: Final = "no memory on disk: this is the first start, or the memory was removed"
+ALARM: Final = ""
+"""The name of the alarm's entry in the file. No device has an empty name."""
 
 
 class KeptDevices(keep.Kept, frozen=True, forbid_unknown_fields=True):
@@ -46,25 +48,22 @@ class Unkept:
 class DeviceMemories:
     """The file of one daemon's devices. `lost`: the reason why the file cannot be read, or "".
 
-    `new`: Does a missing file mean that the devices have never run before? Only a simulation may assume
-    this.
+    `new`: Does a missing entry mean that the device has never run before? A simulation may assume this
+    of every kind.
     """
 
     def __init__(self, store: MemoryStore, *, new: bool = False) -> None:
         self._store = store
         self._lock = threading.Lock()
         self._found: dict[str, bytes] = {}
-        self.lost = ""
+        self.lost, self.new = "", new
         try:
             kept = store.read()
             if kept is not None:
                 found = keep.read(kept, KeptDevices, VERSION, "the memory of devices")
                 self._found = {name: bytes(raw) for name, raw in found.devices.items()}
-            elif not new:
-                self.lost = NO_FILE
         except (OSError, ValueError) as error:
             self.lost = f"the memory on disk cannot be read: {error}"
-        self.new = new and not self.lost
 
     def read(self, device: str) -> bytes | None:
         """Return the bytes of this device's memory. Return None if the file has no entry for the
@@ -81,6 +80,23 @@ class DeviceMemories:
             self._found = found
 
 
+class AlarmMemory:
+    """The alarm's entry in the file, as a store of its own."""
+
+    def __init__(self, memories: DeviceMemories) -> None:
+        self._memories = memories
+
+    def read(self) -> bytes | None:
+        """Return the alarm's bytes, or None without an entry. Raises OSError for a damaged file."""
+        if self._memories.lost:
+            raise OSError(self._memories.lost)
+        return self._memories.read(ALARM)
+
+    def write(self, kept: bytes) -> None:
+        """Replace the alarm's bytes. Raises OSError."""
+        self._memories.write(ALARM, kept)
+
+
 class DeviceKeeper(Generic[M]):
     """The keeper of one device's memory."""
 
@@ -94,12 +110,15 @@ class DeviceKeeper(Generic[M]):
         self._failing = False
 
     def restore(self, initial: M, now: float) -> M:
-        """Return the device's memory from disk. For a new simulation return `initial`. If the memory is
-        lost, log the reason, and return the memory with which the kind begins after such a loss."""
-        kept = self._memories.read(self._device)
-        if kept is None and self._memories.new:
+        """Return the device's memory from disk. For a device that has never run return `initial`. If
+        the memory is lost, log the reason, and return the memory with which the kind begins after such
+        a loss."""
+        kept, lost = self._memories.read(self._device), self._memories.lost
+        new = self._memories.new or self._keeping.missing_is_new
+        if kept is None and new and not lost:
+            self._part = self._keeping.part(initial)
             return initial
-        reason = self._memories.lost or f"{NO_FILE} (nothing about this device)"
+        reason = lost or NO_FILE
         try:
             if kept is not None:
                 return self._keeping.restore(kept, now)

@@ -28,7 +28,7 @@ from bridges.messages.topics import M_co, Topic
 from bridges.messages.words import LONGEST_NAME
 from bridges.runtime.clock import Clock, machine_s
 from bridges.runtime.device import AnyNode, Node
-from bridges.runtime.device_memory import DeviceMemories
+from bridges.runtime.device_memory import AlarmMemory, DeviceMemories
 from bridges.runtime.diagnostics import BUSES
 from bridges.runtime.fleet_alarm import FleetAlarmNode, node_for
 from bridges.runtime.graph_node import AnyGraphNode, GraphNode
@@ -125,17 +125,15 @@ def service(
     if isinstance(kind, GraphKind):
         node = GraphNode(kind, config.section, transport, clock, named, kept, writer)
         return GraphService(node, clock)
+    memories = DeviceMemories(kept, new=new) if kept is not None else None
     if kind.section:
         from bridges.runtime.fleet.service import FleetDevices
 
-        robots = DeviceMemories(kept, new=True) if kept is not None else None
         return FleetDevices(
-            config, kind, transport, open_bus, named, clock, unsafe, writer, robots, rmf=rmf
+            config, kind, transport, open_bus, named, clock, unsafe, writer, memories, rmf=rmf
         )
-    memories = None
-    if kind.keeping is not None and kept is not None:
-        memories = DeviceMemories(kept, new=new)
-    alarm = node_for(config.devices, transport, clock, named, kept, writer)
+    alarms = AlarmMemory(memories) if memories is not None else None
+    alarm = node_for(config.devices, transport, clock, named, alarms, writer)
     return Devices(config, kind, transport, open_bus, named, clock, unsafe, writer, alarm, memories)
 
 
@@ -235,7 +233,7 @@ class Devices:
             self._alarm.obey(order)
             subjects += self._alarm.subjects.values()
         for name, (node, loop) in self._placed.items():
-            decides = self._kind.keeping is not None and device in ("", name)
+            decides = self._kind.decided_by_person and device in ("", name)
             if not isinstance(order, DrillOrdered) and (
                 decides or not isinstance(order, DecidedByPerson)
             ):

@@ -11,7 +11,7 @@ from bridges.kinds.dispenser import keep
 from bridges.kinds.dispenser.memory import Job, WorkcellMemory
 from bridges.kinds.shared.decision import DecidedByPerson, MemoryKept, MemoryNotKept
 from bridges.runtime import holder, order
-from bridges.runtime.device_memory import NO_FILE, DeviceKeeper, DeviceMemories
+from bridges.runtime.device_memory import NO_FILE, AlarmMemory, DeviceKeeper, DeviceMemories
 from bridges.runtime.runtime_directory import MemoryFile
 
 QUEUED = WorkcellMemory(jobs=(Job("a"),))
@@ -35,15 +35,30 @@ class Full:
 def test_two_devices_share_a_file_and_each_finds_its_own_part(tmp_path: Path) -> None:
     file = MemoryFile(tmp_path / "state" / "kept.json")
     memories = DeviceMemories(file)
-    assert memories.lost == NO_FILE
     for name in ("a", "b"):
         memories.write(name, keep.persist(WorkcellMemory(jobs=(Job(name),))))
     again = DeviceMemories(file)
     assert again.lost == ""
     found = {name: keep.restore(again.read(name) or b"", 0.0).jobs[0].guid for name in ("a", "b")}
     assert found == {"a": "a", "b": "b"}
-    lost = DeviceKeeper("c", keep.KEEPING, again).restore(WorkcellMemory(), 0.0).lost
-    assert "nothing about this device" in lost
+    for of in (again, DeviceMemories(MemoryFile(tmp_path / "none" / "kept.json"))):
+        assert DeviceKeeper("c", keep.KEEPING, of).restore(WorkcellMemory(), 0.0).lost == NO_FILE
+
+
+def test_the_alarm_shares_the_file_with_the_devices(tmp_path: Path) -> None:
+    """Two stores of one path would each replace what the other has written."""
+    file = MemoryFile(tmp_path / "kept.json")
+    memories = DeviceMemories(file)
+    alarm = AlarmMemory(memories)
+    assert alarm.read() is None
+    alarm.write(b'"raised"')
+    memories.write("a", b'"latched"')
+    alarm.write(b'"over"')
+    again = DeviceMemories(file)
+    assert (again.read("a"), AlarmMemory(again).read()) == (b'"latched"', b'"over"')
+    file.write(b"{")
+    with pytest.raises(OSError, match="the memory on disk cannot be read"):
+        AlarmMemory(DeviceMemories(file)).read()
 
 
 def test_a_simulation_without_a_file_has_lost_nothing() -> None:

@@ -15,26 +15,11 @@ from bridges.runtime.clock import Clock
 from bridges.runtime.diagnostics import diagnosis
 from bridges.runtime.fleet_alarm import FleetAlarmNode
 from bridges.runtime.outlet import Named
+from tests.runtime.virtual_graph import Disk
 from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 WALL = 1_800_000_000.0
 FIRE, CLEAR = AlarmInputs(frozenset({"fire"}), True), AlarmInputs(seen=True)
-
-
-class Disk:
-    """A file in memory. With `full` a write fails."""
-
-    def __init__(self) -> None:
-        self.kept: bytes | None = None
-        self.full = False
-
-    def read(self) -> bytes | None:
-        return self.kept
-
-    def write(self, kept: bytes) -> None:
-        if self.full:
-            raise OSError("no space left on device")
-        self.kept = kept
 
 
 def same(topic: AnyTopic) -> AnyTopic:

@@ -22,7 +22,6 @@ from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode, Node
 from bridges.runtime.device_memory import DeviceMemories
 from bridges.runtime.graph_node import AnyGraphNode, GraphNode
-from bridges.runtime.keeper import MemoryStore
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.subject import Status
 from bridges.transports.transport import Publisher
@@ -64,7 +63,7 @@ class DeviceDaemon:
         self.scanned: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.relayed: Callable[[Edge], None] = lambda edge: None
         self.writer: NoWriter = NOBODY
-        self.disk: MemoryStore | None = None
+        self.disk = Disk()
         self.started: Callable[[DeviceDaemon], None] = lambda daemon: None
         self.hears: Callable[[DeviceDaemon, Topic[Any], Any], None] = lambda daemon, topic, told: (
             None
@@ -98,7 +97,7 @@ class DeviceDaemon:
             self._publish,
             clock,
             self.writer,
-            memories=DeviceMemories(self.disk, new=True) if self.disk else None,
+            memories=DeviceMemories(self.disk, new=True),
         )
         self.alive = True
         subscribe = partial(self._place.subscribe_to, self.name, kind.device_name)

@@ -20,7 +20,6 @@ from bridges.settings.load import load
 from drivers.dispenser import dry_contact
 from hal_fakes.plants import dispenser
 from tests.drivers.far import PointsFar
-from tests.runtime.virtual_graph import Disk
 from tests.site.building import CONFIG, Device
 from tests.site.daemons import DeviceDaemon
 from tests.site.network import Air, Place
@@ -53,7 +52,6 @@ class Storeroom:
         self.air = Air(timeline, random)
         self._plant, device = _device(timeline)
         self.daemon = DeviceDaemon(timeline, self.air, device)
-        self.daemon.disk = Disk()
         self._rmf = Place(self.air, "delivery", lambda: None)
         self._judge = Judge("dispenser", NAME, only=LAWS)
         self._requests = self._rmf.publisher(topics.DISPENSER_REQUESTS)

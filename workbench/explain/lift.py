@@ -27,6 +27,7 @@ Only a fleet adapter that knows the recall floor sends this request.
 """
 FLOOR_S: Final = 20.0
 """Maximum normal time (s) that a car needs from one floor to the next."""
+LATCHED: Final = "FIRE_LATCHED"
 ALARMS: Final = {"FIRE": "fire alarm", "EMERGENCY": "emergency (stop, code blue, earthquake)"}
 
 
@@ -191,6 +192,12 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
         f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: the lift takes no robot"
         " until this mode ends. RMF ignores the mode, and only sees that the lift does not come."
     )
+    if LATCHED in lift.faults(clock.now):
+        found.because = (LATCHED,)
+        if holder != NOBODY:
+            found.say(lift.keeps(clock.now))
+        found.acts("a person", "when the lift is safe, reset it: the daemon sees no fire now")
+        return
     ends = f"the {ALARMS[mode]} has to end, with a reset if the lift's settings require one"
     if holder == NOBODY:
         found.acts("the controller", ends)

@@ -41,6 +41,7 @@ KIND: Kind[
     answer=messages.answer_on(topics.DISPENSER_RESULTS),
     stamped=messages.stamped,
     keeping=keep.KEEPING,
+    decided_by_person=True,
 )
 
 RECORDED: Recorded = {

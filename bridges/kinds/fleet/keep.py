@@ -29,4 +29,5 @@ KEEPING: Final = Keeping[RobotMemory](
     persist=lambda memory: msgspec.json.encode(KeptRobot(VERSION, memory.light.held)),
     restore=restore,
     lost=lambda reason: RobotMemory(),
+    missing_is_new=True,
 )

@@ -1,10 +1,11 @@
 """Lifts: a LiftRequest switches outputs, and the lift's inputs become a LiftState."""
 
-from bridges.kinds.lift import core, memory, messages, relays, report, signals
+from bridges.kinds.lift import core, keep, memory, messages, relays, report, signals
 from bridges.kinds.lift.memory import LiftLimits, LiftMemory
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Asked, LiftOutputs, LiftSample
+from bridges.kinds.shared.decision import MemoryKept, MemoryNotKept
 from bridges.kinds.shared.kind import Kind
 from bridges.kinds.shared.recorded import Recorded
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
@@ -14,7 +15,7 @@ KIND: Kind[
     LiftLimits,
     LiftMemory,
     LiftSample,
-    Asked,
+    Asked | MemoryKept | MemoryNotKept,
     LiftOutputs,
     LiftReport,
 ] = Kind(
@@ -33,6 +34,7 @@ KIND: Kind[
     on_map=lambda settings: settings.on_map(),
     state_message=messages.state_message,
     summary=messages.summary,
+    keeping=keep.KEEPING,
 )
 
 RECORDED: Recorded = {

@@ -27,7 +27,7 @@ LIFT-3. A request sets the destination and the mode. If the door is held, a requ
    the rules for the outputs.
 LIFT-4. An obstacle switches every output off and never changes the session. The obstacles are the
    following. Overload is none, because it only delays the ride.
-   - fire, and the latch after a fire;
+   - fire, and the latch after a fire, which outlives a restart (`bridges/kinds/lift/keep.py`);
    - code blue, earthquake, emergency, out of service, manual mode;
    - a second node for this lift;
    - inputs that cannot be believed, outputs that cannot be written. A gap in reading or writing that is
@@ -66,6 +66,8 @@ from bridges.kinds.shared.decision import (
     Decision,
     Fault,
     IoFailed,
+    MemoryKept,
+    MemoryNotKept,
     OperatorReset,
     RivalSeen,
     Sampled,
@@ -190,6 +192,10 @@ def _take(
             return replace(memory, senses=gap(memory.senses, now), io_fault=reason), ""
         case RivalSeen():
             return replace(memory, rival_at=now), ""
+        case MemoryKept():
+            return replace(memory, not_kept=""), ""
+        case MemoryNotKept(reason):
+            return replace(memory, not_kept=reason), ""
         case OperatorReset():
             return _reset(memory, now, limits), ""
         case LiftRequested():
@@ -267,6 +273,9 @@ def _faults(
         found += _faults_of_rmf(session, now, limits)
     elif memory.grace and memory.grace.in_car:
         found.append(Fault("ROBOT_LEFT_IN_CAR", f"{memory.grace.session.id} was ended in mid-ride"))
+    if memory.not_kept and limits.fire_reset == "manual":
+        told = "a restart would not know whether the lift waits for a reset after a fire"
+        found.append(Fault("NOT_KEPT", f"{told}: {memory.not_kept}"))
     return (*found, *view.faults)
 
 

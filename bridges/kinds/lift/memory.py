@@ -191,8 +191,9 @@ class LiftMemory(msgspec.Struct, frozen=True):
 
     `rival_at`: the time when another node for this lift was last heard. `io_fault`: the error of the
     last read or write; "" if both succeeded. `unwritten_since`: no write has succeeded since this time.
-    `write_failed`: the last scan's write failed. `own` maps a session to the destination that the
-    session's robot itself last requested.
+    `write_failed`: the last scan's write failed. `not_kept`: the reason why `fire_latched` is not on
+    disk; "" if it is. `own` maps a session to the destination that the session's robot itself last
+    requested.
     """
 
     senses: LiftSenses = LiftSenses()
@@ -204,4 +205,5 @@ class LiftMemory(msgspec.Struct, frozen=True):
     io_fault: str = ""
     unwritten_since: float | None = None
     write_failed: bool = False
+    not_kept: str = ""
     own: Mapping[str, str] = {}

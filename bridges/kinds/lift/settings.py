@@ -131,7 +131,7 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     fire_reset: Annotated[
         Literal["auto", "manual"],
         tells("""when RMF may use the lift again after a fire alarm. `auto`: when the alarm clears.
-        `manual`: only after `rmf-bridge reset`."""),
+        `manual`: only after `rmf-bridge reset`, even if the daemon restarts."""),
     ] = "auto"
     alarm_on: Annotated[
         AlarmOn,

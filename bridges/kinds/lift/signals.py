@@ -4,7 +4,14 @@ from enum import Enum, StrEnum
 
 import msgspec
 
-from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled
+from bridges.kinds.shared.decision import (
+    IoFailed,
+    MemoryKept,
+    MemoryNotKept,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+)
 
 
 class DoorReading(Enum):
@@ -125,4 +132,6 @@ class FromAdapter(msgspec.Struct, frozen=True):
 Asked = LiftRequested | EndRequested | FromAdapter
 """The events that are made from requests."""
 
-Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Asked
+Event = (
+    Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | MemoryKept | MemoryNotKept | Asked
+)

@@ -56,17 +56,21 @@ class Keeping(Struct, Generic[M], frozen=True):
 
     `part(memory)`: this part, compared by value. `persist(memory)`: the bytes of this part.
     `restore(kept, now)`: the memory from these bytes. `restore` raises ValueError for bytes that
-    `persist` did not make. `lost(reason)`: the memory for a start at which the bytes are missing or
-    wrong, although an earlier run may have saved some.
+    `persist` did not make. `lost(reason)`: the memory for a start at which the bytes are wrong, or are
+    missing although an earlier run may have saved some. `missing_is_new`: without bytes no earlier run
+    has saved any.
 
     The core also gets the event `MemoryKept` or `MemoryNotKept` for each attempt to write, before
-    outputs and messages go out. It also gets the event `DecidedByPerson`.
+    messages go out, and before outputs are switched. `outputs_first`: outputs are switched before the
+    attempt, because a slow disk must not delay them, and they do not depend on what is on disk.
     """
 
     part: Callable[[M], object]
     persist: Callable[[M], bytes]
     restore: Callable[[bytes, float], M]
     lost: Callable[[str], M]
+    missing_is_new: bool = False
+    outputs_first: bool = False
 
 
 class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
@@ -104,6 +108,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
       (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
     - `keeping`: the functions that save and restore a memory that must survive a restart; None for a
       kind without such a memory.
+    - `decided_by_person`: the core gets the event `DecidedByPerson`.
 
     Settings:
     - `devices_key`: the section of the devices in the YAML.
@@ -135,6 +140,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     results: Callable[[str, R], tuple[Said, ...]] = lambda name, report: ()
     stamped: Callable[[Any, Time], Message] = lambda message, stamp: message
     keeping: Keeping[M] | None = None
+    decided_by_person: bool = False
     section: tuple[str, type[Struct]] | None = None
     attended_by: Topic[Message] | None = None
     recorded: tuple[Topic[Message], ...] = ()

@@ -31,8 +31,10 @@ from bridges.messages.definitions import (
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import Node
+from bridges.runtime.device_memory import DeviceMemories
 from drivers import DriverError
 from tests.accepted import accepted
+from tests.runtime.virtual_graph import Disk
 
 SCAN_S = 0.05
 LEAST_GAP_S = 0.001
@@ -228,6 +230,7 @@ class Story:
         self.alarms: list[tuple[float, Message]] = []
         self.hear: Callable[[LiftState], None] = lambda state: None
         self.incoming: list[tuple[Topic[Any], LiftRequest]] = []
+        self.disk = Disk()
         self._kind = kind
         self._scan_s = scan_s
         self._scans = 0
@@ -236,10 +239,17 @@ class Story:
     # ---- events
 
     def restart(self) -> None:
-        """Start a new daemon on the same lift. The new daemon remembers nothing."""
+        """Start a new daemon on the same lift. It remembers only what is on its disk."""
         clock = Clock(lambda: self.now, lambda: WALL + self.now + self.wall_step_s)
         self.node = Node(
-            "Lift1", self._kind, self.settings, self.limits, self.building, self._publish, clock
+            "Lift1",
+            self._kind,
+            self.settings,
+            self.limits,
+            self.building,
+            self._publish,
+            clock,
+            memories=DeviceMemories(self.disk),
         )
         self._alarm = fleet_alarm.initial()
         self._alarm_hears(MaySpeak(True))

@@ -13,6 +13,7 @@ from bridges.kinds.lift.signals import (
 )
 from bridges.kinds.shared.decision import (
     Fault,
+    MemoryNotKept,
     RivalSeen,
 )
 from tests.kinds.lift.alone import ASKED, AT_L1, CLOSED, Alone
@@ -23,6 +24,13 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     "a fire that was": (
         [(0.0, replace(AT_L1, hazards=frozenset({Hazard.FIRE}))), (0.5, AT_L1), (1.6, AT_L1)],
         Fault("FIRE_LATCHED", "run rmf-bridge reset when the lift is safe"),
+    ),
+    "a fire of which a restart would not know": (
+        [(0.0, AT_L1), (0.1, MemoryNotKept("disk full"))],
+        Fault(
+            "NOT_KEPT",
+            "a restart would not know whether the lift waits for a reset after a fire: disk full",
+        ),
     ),
     "another node": (
         [(0.0, AT_L1), (0.1, RivalSeen())],

@@ -1,5 +1,7 @@
 """A hazard or a second node takes the lift away from RMF. When it is over, RMF gets the lift back."""
 
+from typing import Any
+
 import pytest
 from msgspec.structs import replace
 
@@ -22,6 +24,7 @@ from bridges.messages.definitions import Bool, EmergencySignal
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, RETAINED
 from tests.kinds.lift.alone import AT_L1, CLOSED, DEBOUNCE, Alone
 from tests.kinds.lift.story import Building, Controller, Story
+from tests.runtime.virtual_graph import Disk
 
 CLOSED_AT_L1 = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=True)
 OPEN_AT_L1 = replace(CLOSED_AT_L1, door=DoorReading.OPEN)
@@ -366,6 +369,93 @@ def test_with_manual_reset_only_an_operator_gives_the_lift_back_and_only_after_t
     story.asks("B", "L1")
     story.run(61.0)
     assert (story.outputs, story.faults) == (HELD, [])
+
+
+def latched(**settings: Any) -> Story:
+    """Return the story of a free lift whose fire is over and is latched."""
+    story = waiting(fire_reset="manual", **settings)
+    story.building.hazard(Hazard.FIRE)
+    story.run(5.0)
+    story.ends("A")
+    story.building.hazard()
+    story.run(7.0)
+    return story
+
+
+def test_a_fire_stays_latched_when_the_daemon_restarts() -> None:
+    """A power cut in a fire is no operator."""
+    story = latched()
+    for _ in range(2):
+        story.restart()
+        story.resets()  # before the inputs have settled they may hide the fire
+        story.run(story.now + 20.0)
+        story.asks("A", "L1")
+        assert story.faults == ["FIRE_LATCHED"]
+        assert (story.outputs, story.node.refused) == (LiftOutputs(), {"FIRE_LATCHED": 1})
+    story.resets()
+    story.restart()
+    story.run(story.now + 1.0)
+    story.asks("A", "L1")
+    story.run(story.now + 1.0)
+    assert (story.outputs, story.faults) == (HELD, [])
+
+
+@pytest.mark.parametrize(
+    ("fire_reset", "kept", "faults"),
+    [
+        ("manual", b"{", ["FIRE_LATCHED"]),
+        ("manual", b'{"version":1,"devices":{"Lift1":{"version":2}}}', ["FIRE_LATCHED"]),
+        ("manual", b'{"version":1,"devices":{"Lift2":{}}}', []),
+        ("manual", None, []),
+        ("auto", b"{", []),
+    ],
+)
+def test_a_lift_whose_memory_is_damaged_waits_for_a_reset_and_a_new_lift_does_not(
+    fire_reset: str, kept: bytes | None, faults: list[str]
+) -> None:
+    story = Story(fire_reset=fire_reset)
+    story.disk.kept = kept
+    story.restart()
+    story.run(2.0)
+    assert story.faults == faults
+
+
+def test_a_full_disk_delays_no_output_and_is_a_fault_only_where_a_latch_matters() -> None:
+    for fire_reset, faults in (("manual", ["FIRE", "NOT_KEPT"]), ("auto", ["FIRE"])):
+        story = waiting(fire_reset=fire_reset)
+        story.disk.full = True
+        story.building.hazard(Hazard.FIRE)
+        story.run(5.0)
+        assert story.outputs == LiftOutputs()
+        assert [code for code in story.faults if code != "RMF_SILENT"] == faults
+    story = latched()
+    story.disk.full = True
+    story.resets()
+    assert story.faults == ["NOT_KEPT"]
+    story.disk.full = False
+    story.run(story.now + 1.1)
+    assert story.faults == []
+
+
+def test_the_outputs_are_off_before_the_latch_is_written() -> None:
+    """A write to a worn card may take seconds."""
+
+    class Slow(Disk):
+        def write(self, kept: bytes) -> None:
+            seen.append(story.outputs)
+            super().write(kept)
+
+    seen: list[LiftOutputs] = []
+    story = waiting(fire_reset="manual")
+    story.disk = Slow()
+    story.restart()
+    story.run(story.now + 1.0)
+    story.asks("A", "L1")
+    story.run(story.now + 2.0)
+    assert story.outputs == HELD
+    story.building.hazard(Hazard.FIRE)
+    story.run(story.now + 1.0)
+    assert seen == [LiftOutputs()]
 
 
 def test_an_end_or_a_new_request_does_not_clear_a_fire_latch() -> None:

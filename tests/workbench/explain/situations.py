@@ -72,6 +72,19 @@ def fire() -> Case:
     return scene.heard, "lift", "Lift1"
 
 
+def fire_is_over_and_latched() -> Case:
+    """The fire is over, and the lift waits for an operator. A robot has the lift, and another waits for
+    it."""
+    scene, red, _ = _two("Lift2")
+    scene.until(red)
+    red.asks("Lift2", "L4", inside=True)
+    scene.press("Lift2", "fire_alarm", True)
+    scene.run(20.0)
+    scene.press("Lift2", "fire_alarm", False)
+    scene.run(20.0)
+    return scene.heard, "lift", "Lift2"
+
+
 def fire_with_a_robot_inside() -> Case:
     """The lift goes into fire mode when the robot is in the car."""
     scene, red, _ = _two("Lift1")
@@ -304,6 +317,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         holder_is_dead,
         holder_alone_is_dead,
         fire,
+        fire_is_over_and_latched,
         fire_with_a_robot_inside,
         open_but_at_no_floor,
         floor_contact_lost,
