@@ -431,7 +431,7 @@ def test_a_full_disk_delays_no_output_and_is_a_fault_only_where_a_latch_matters(
     story = latched()
     story.disk.full = True
     story.resets()
-    assert story.faults == ["NOT_KEPT"]
+    assert (story.faults, story.node.refused) == (["NOT_KEPT"], {})
     story.disk.full = False
     story.run(story.now + 1.1)
     assert story.faults == []

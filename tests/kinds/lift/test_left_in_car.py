@@ -204,7 +204,8 @@ def test_a_robot_gets_its_lift_back_after_its_new_adapter_has_sent_end(
     rmf.run(rmf.story.now + back_after_s)
     assert rmf.supervisor.slots["Lift1"].session_id == B
     assert (sessions(rmf.story)[-1], rmf.story.outputs.call) == ("", None)
-    assert rmf.story.faults == ["ROBOT_LEFT_IN_CAR"]
+    left = {"code": "ROBOT_LEFT_IN_CAR", "detail": f"{A} was ended in mid-ride"}
+    assert rmf.story.node.status()["faults"] == [left]
     rmf.asks(fresh, "L4", inside=True)
     rmf.until_done(fresh)
     assert rmf.story.state == "AGV, open at L4, fleet/a to L4"
