@@ -256,7 +256,7 @@ def site(serial: modbus.Serial | None, on_s: float) -> Iterator[tuple[DryContact
     plant = DoorPlant("door", wires(settings), open_s=0.05, close_s=0.05, auto_close_s=0.05)
     world = RealTime({"door": plant})
     wired = [PlantWiring(plant, wires(settings), modbus.canonical)]
-    with on_modbus(world, wired, serial, timeout_s=2.0) as (bus, _):
+    with on_modbus(world, wired, serial, timeout_s=5.0) as (bus, _):
         driver = create("door", settings, bus)
         driver.open()
         yield driver, plant
