@@ -162,10 +162,11 @@ class Node(Generic[S, L, M, X, E, O, R]):
             if isinstance(event, OperatorReset):  # claim a failed device again at the next scan
                 self._open = self._open and not self._io_fault
             self._decide(event)
-        if self._kind.keeping is not None and self._kind.keeping.outputs_first:
+        outputs_first = self._kind.keeping is not None and self._kind.keeping.outputs_first
+        if outputs_first:
             self._write()
-        self._keep()
-        self._write()
+        if self._keep() or not outputs_first:
+            self._write()
 
     def make_safe(self) -> bool:
         """Switch every output off. If an output is not verified off, log this and return False."""
@@ -208,13 +209,15 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._has_read = True
         return Sampled(sample)
 
-    def _keep(self) -> None:
-        """Write the core's memory to disk, before its decision takes effect. The outputs are switched
-        and the states are published only afterwards."""
-        if self._keeper is not None:
-            kept: Any = self._keeper.keep(self.subject.memory, self._clock.monotonic())
-            if kept is not None:  # every kind with `keeping` has such an event
-                self._decide(kept)
+    def _keep(self) -> bool:
+        """Write the core's memory to disk, before its decision takes effect. States are published only
+        afterwards. Return whether the core has decided again."""
+        if self._keeper is None:
+            return False
+        kept: Any = self._keeper.keep(self.subject.memory, self._clock.monotonic())
+        if kept is not None:  # every kind with `keeping` has such an event
+            self._decide(kept)
+        return kept is not None
 
     def _write(self) -> None:
         """Write the levels of all outputs. Write nothing before the first reading."""

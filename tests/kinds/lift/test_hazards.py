@@ -458,6 +458,24 @@ def test_the_outputs_are_off_before_the_latch_is_written() -> None:
     assert seen == [LiftOutputs()]
 
 
+def test_a_lift_whose_memory_has_not_changed_writes_its_outputs_once_a_scan() -> None:
+    """On a slow bus each write takes time."""
+
+    class Counted(Building):
+        reads = 0
+
+        def read(self) -> LiftSample:
+            self.reads += 1
+            return super().read()
+
+    building = Counted(CLOSED_AT_L1)
+    story = Story(building, fire_reset="manual")
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(5.0)
+    assert building.writes == building.opened + building.reads
+
+
 def test_an_end_or_a_new_request_does_not_clear_a_fire_latch() -> None:
     story = waiting(fire_reset="manual")
     story.building.hazard(Hazard.FIRE)
