@@ -88,6 +88,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             memories = memories or DeviceMemories(Unkept(), new=True)
             self._keeper = DeviceKeeper(name, kind.keeping, memories)
             memory = self._keeper.restore(memory, clock.monotonic())
+        self._outputs_first = kind.keeping is not None and kind.keeping.outputs_first
         core: SubjectCore[M, DeviceEvent[X, E], O, R] = SubjectCore(
             "device",
             lambda memory, event, now: kind.decide(memory, event, now, limits),
@@ -143,6 +144,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._decide_all(reading, events)
         took_s = self._clock.monotonic() - started
         self._alarm()
+        if self._outputs_first and self._keep():
+            self._write()
         self._tell()
         self._answer()
         self._count(took_s)
@@ -162,11 +165,9 @@ class Node(Generic[S, L, M, X, E, O, R]):
             if isinstance(event, OperatorReset):  # claim a failed device again at the next scan
                 self._open = self._open and not self._io_fault
             self._decide(event)
-        outputs_first = self._kind.keeping is not None and self._kind.keeping.outputs_first
-        if outputs_first:
-            self._write()
-        if self._keep() or not outputs_first:
-            self._write()
+        if not self._outputs_first:
+            self._keep()
+        self._write()
 
     def make_safe(self) -> bool:
         """Switch every output off. If an output is not verified off, log this and return False."""

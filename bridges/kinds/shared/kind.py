@@ -61,8 +61,8 @@ class Keeping(Struct, Generic[M], frozen=True):
     has saved any.
 
     The core also gets the event `MemoryKept` or `MemoryNotKept` for each attempt to write, before
-    messages go out, and before outputs are switched. `outputs_first`: outputs are switched before the
-    attempt, because a slow disk must not delay them, and they do not depend on what is on disk.
+    messages go out, and before outputs are switched. `outputs_first`: outputs are switched and the
+    alarm is told before the attempt, because a slow disk must not delay them.
     """
 
     part: Callable[[M], object]

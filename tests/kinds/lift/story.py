@@ -249,6 +249,7 @@ class Story:
             self.building,
             self._publish,
             clock,
+            tell_alarm=lambda name, inputs: self._alarm_hears(DeviceTells(name, inputs)),
             memories=DeviceMemories(self.disk),
         )
         self._alarm = fleet_alarm.initial()
@@ -342,9 +343,6 @@ class Story:
     def _scan(self, *events: Any) -> None:
         self.building.advance(self.now)
         self.node.scan(events)
-        decision = self.node.subject.decision
-        assert decision is not None
-        self._alarm_hears(DeviceTells("Lift1", decision.report.alarm))
         if self.incoming:
             arrived, self.incoming = self.incoming, []
             self.receive(*arrived)

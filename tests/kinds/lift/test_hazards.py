@@ -437,16 +437,16 @@ def test_a_full_disk_delays_no_output_and_is_a_fault_only_where_a_latch_matters(
     assert story.faults == []
 
 
-def test_the_outputs_are_off_before_the_latch_is_written() -> None:
+def test_the_outputs_are_off_and_the_fleets_told_before_the_latch_is_written() -> None:
     """A write to a worn card may take seconds."""
 
     class Slow(Disk):
         def write(self, kept: bytes) -> None:
-            seen.append(story.outputs)
+            seen.append((story.outputs, [message for _, message in story.alarms]))
             super().write(kept)
 
-    seen: list[LiftOutputs] = []
-    story = waiting(fire_reset="manual")
+    seen: list[tuple[LiftOutputs, list[object]]] = []
+    story = waiting(fire_reset="manual", alarm="fire_alarm_trigger")
     story.disk = Slow()
     story.restart()
     story.run(story.now + 1.0)
@@ -455,7 +455,7 @@ def test_the_outputs_are_off_before_the_latch_is_written() -> None:
     assert story.outputs == HELD
     story.building.hazard(Hazard.FIRE)
     story.run(story.now + 1.0)
-    assert seen == [LiftOutputs()]
+    assert seen == [(LiftOutputs(), [Bool(True)])]
 
 
 def test_a_lift_whose_memory_has_not_changed_writes_its_outputs_once_a_scan() -> None:
