@@ -143,7 +143,9 @@ def test_watch_has_a_row_for_the_alarm_and_for_each_panel() -> None:
         BoardRow("alarm", "bridge", stands, simulated=True),
         BoardRow("alarm", "Panel", "alarm: fire", simulated=True, faults=faults),
     ]
-    assert board.rows(60.0, WALL + 60) == [BoardRow("alarm", "bridge", stands, mark="SILENT")]
+    assert board.rows(60.0, WALL + 60) == [
+        BoardRow("alarm", "bridge", stands, mark="SILENT", simulated=True)
+    ]
     board.take(told(61.0, "drill"))
     [row, _] = [*board.rows(61.0, WALL + 61), None]
     assert row is not None

@@ -109,7 +109,7 @@ class Board:
             (one.kind, words.printable(one.id))
             for one in self._graph.stated()
             if one.first_state and now - one.first_state.at < SETTLES_S
-            if not any(said.kind == one.kind for said in _said(one, now))
+            if not any(said.kind == one.kind for said in _said(one))
         }
 
     def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[BoardRow]:
@@ -124,7 +124,7 @@ class Board:
         return [*devices, *self._alarms(now), *self._coordinators(now), *self._robots(now)]
 
     def _device(self, one: AnyDevice, now: float, wall: float) -> BoardRow:
-        found = _said(one, now)
+        found = _said(one)
         state: words.Stated = one.state  # type: ignore[assignment]
         held_by = words.holder(state)
         if isinstance(one, ObservedDoor):
@@ -137,7 +137,7 @@ class Board:
             words.printable(", ".join(filter(None, map(_waiting, found)))),
             _age(one.stamped_at, wall),
             _mark(one, now),
-            any(said.kind == one.kind and self._simulated(said, now) for said in found),
+            any(said.kind == one.kind and self._simulated(said) for said in found),
             _faults(found),
         )
 
@@ -148,7 +148,7 @@ class Board:
             daemon = nodes.get(f"{one.node}: daemon")
             mark = "" if one.current or not one.stands else "SILENT"
             if one.current or one.stands:
-                simulated = daemon is not None and self._simulated(daemon, now)
+                simulated = daemon is not None and self._simulated(daemon)
                 text, faults = one.condition, _faults([daemon] if daemon else [])
                 yield BoardRow(
                     "alarm", one.node, text, mark=mark, simulated=simulated, faults=faults
@@ -157,7 +157,7 @@ class Board:
             if panel.kind == PANEL and not name.endswith(": daemon") and panel.is_current(now):
                 state = f"{panel.value('state')}: {panel.value('active') or 'no source'}"
                 shown = words.printable(name.partition(": ")[2])
-                simulated = self._simulated(panel, now)
+                simulated = self._simulated(panel)
                 yield BoardRow(
                     "alarm",
                     shown,
@@ -180,7 +180,7 @@ class Board:
                 words.printable(name.partition(": ")[0]),
                 words.printable(f"passive: {passive}") if passive else _coordinates(diagnosis),
                 waiting=words.printable(queue),
-                simulated=self._simulated(diagnosis, now),
+                simulated=self._simulated(diagnosis),
                 faults=_faults([diagnosis]),
             )
 
@@ -206,7 +206,7 @@ class Board:
             waiting=words.printable(", ".join(f"{d.kind} {d.id}: {w.wants}" for d, w in asks)),
             age=_seconds(said.value("input_age_s"), silent_s),
             mark="" if said.is_current(now) else f"SILENT {silent_s:.0f} s",
-            simulated=self._simulated(said, now),
+            simulated=self._simulated(said),
             faults=_faults([said]),
         )
 
@@ -214,17 +214,19 @@ class Board:
         daemon = self._graph.nodes.get(f"{diagnosis.name.partition(': ')[0]}: daemon")
         return daemon if daemon and daemon.is_current(now) else None
 
-    def _simulated(self, diagnosis: Diagnosis, now: float) -> bool:
-        daemon = self._daemon(diagnosis, now)
+    def _simulated(self, diagnosis: Diagnosis) -> bool:
+        daemon = self._daemon(diagnosis, diagnosis.last.at)
         simulated = (
             daemon.value("simulated") == "yes" if daemon else False
         )  # a fault may hide SIMULATED in the message
         return daemon is not None and (simulated or SIMULATED in daemon.message)
 
 
-def _said(device: AnyDevice, now: float) -> list[Diagnosis]:
-    """Return our nodes' present diagnostics about this device."""
-    return [one for one in device.diagnoses.values() if one.is_current(now)]
+def _said(device: AnyDevice) -> list[Diagnosis]:
+    """Return our nodes' diagnostics about this device that belong to its last state. So a silent device
+    keeps its faults, and stays simulated."""
+    assert device.last_state is not None  # only devices with a state have a row
+    return [one for one in device.diagnoses.values() if one.is_current(device.last_state.at)]
 
 
 def _waiting(said: Diagnosis) -> str:

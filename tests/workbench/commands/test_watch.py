@@ -111,6 +111,9 @@ def test_a_row_names_the_faults_that_its_daemon_and_its_supervisor_report() -> N
     assert row.faults == "RMF_SILENT; OVERLOAD; HOLDER_SILENT"
     heard.take(Heard(101.0, WALL, "", told("lift", "Lift1")))
     assert [row.faults for row in heard.rows(101.0, WALL)] == ["HOLDER_SILENT"]
+    (silent,) = heard.rows(104.0, WALL)
+    assert (silent.mark, silent.faults) == ("SILENT 4 s", "HOLDER_SILENT")
+    heard.take(Heard(104.0, WALL, "", LIFT))
     assert [row.faults for row in heard.rows(104.0, WALL)] == [""]
 
 
@@ -288,6 +291,8 @@ def test_a_simulation_is_marked_and_a_simulated_supervisor_does_not_make_its_lif
     simulated = board(LIFT, daemon("node", "lift", simulated=True))
     (row,) = simulated.rows(100.0, WALL)
     assert row.cells()[-2:] == ("SIMULATED", "OVERLOAD (since 3 s)")
+    (row,) = simulated.rows(200.0, WALL)
+    assert row.cells()[-2:] == ("SIMULATED SILENT 100 s", "OVERLOAD (since 3 s)")
     (row,) = board(LIFT, daemon("node", "lift_supervisor", simulated=True)).rows(100.0, WALL)
     assert not row.simulated
 
