@@ -108,6 +108,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         0: "Ctrl-C or SIGTERM, or every test notice was taken",
         1: f"{GRAPH}, or a test notice was not taken",
         73: "--ack cannot be written",
+        77: "this user may not acknowledge troubles of the service",
         78: "the file of recipients has an error",
     },
     "status": {

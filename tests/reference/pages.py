@@ -19,7 +19,7 @@ from bridges.runtime import faults
 from bridges.settings.config import Config
 from bridges.settings.load import load
 from tests.reference import alerts, hazards, promised
-from workbench.commissioning import reference
+from workbench.commands import schema
 from workbench.commissioning.examples import device_yamls
 from workbench.judge.judge import KINDS
 from workbench.judge.report import markdown
@@ -212,7 +212,7 @@ decisions are not changed, so a file that they name may have moved since ([0116]
 
 PAGES: Final[dict[str, Callable[[], str]]] = {
     "reference/commands.md": commands,
-    "reference/configuration.md": reference.page,
+    "reference/configuration.md": schema.markdown,
     "reference/exit-codes.md": exit_codes,
     "reference/faults.md": faults.page,
     "reference/laws.md": laws,

@@ -7,13 +7,14 @@ inside a daemon that moves hardware.
 import argparse
 import logging
 import os
+import shlex
 import sys
-import threading
 import time
-from collections import deque
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator
 from contextlib import closing, suppress
 from datetime import datetime
+from hashlib import sha256
 from pathlib import Path
 from typing import Final
 
@@ -38,20 +39,20 @@ from workbench.graph.join import (
 )
 from workbench.graph.live import Ear
 from workbench.notify import channels
+from workbench.notify.courier import Courier
 from workbench.notify.messages import NoticeText, worded
 from workbench.notify.notices import KeptTrouble, Notices
 from workbench.notify.settings import NotifySettings, Recipient, load
-from workbench.notify.troubles import Trouble, of_certificates, troubles
+from workbench.notify.troubles import Trouble, heard_now, of_certificates, of_daemons, troubles
 
 logger = logging.getLogger(__name__)
 TURN_S: Final = 1.0
-RETRY_S: Final = (5.0, 30.0, 120.0, 600.0)
-"""Pauses (s) after failed tries. After the last pause of the list, the program repeats the last
-pause."""
-MOST_WAITING: Final = 200
-"""Maximum number of notices that wait for an unreachable recipient. The program drops the oldest
-notices, and logs that."""
-CERTIFICATES_EVERY_S: Final = 60.0
+DAEMONS_EVERY_S: Final = 5.0
+FILES_EVERY_S: Final = 60.0
+"""The time (s) after which certificates and systemd's units are looked at again."""
+TOLD: Final = "told.json"
+ACKNOWLEDGED: Final = "acknowledged-"
+"""The beginning of a file's name. Each file has the key of one trouble that a person acknowledges."""
 NOTIFY: Final = "notify"
 """Name that notices give in place of a daemon's name. The name stands for certificates that only the
 file of `notify` lists."""
@@ -75,9 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--state",
         type=Path,
-        default=_state(),
         metavar="DIR",
-        help="the folder that keeps the troubles already reported",
+        help="the folder that keeps the troubles already reported; by default the service's",
     )
     add_graph_arguments(parser)
 
@@ -86,8 +86,11 @@ def _state() -> Path:
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     if given:
         return Path(given)
-    service = os.access(SERVICE_STATE, os.R_OK | os.W_OK | os.X_OK)
-    return SERVICE_STATE if service else directories.state_base() / "notify"
+    return SERVICE_STATE if _is_ours(SERVICE_STATE) else directories.state_base() / "notify"
+
+
+def _is_ours(folder: Path) -> bool:
+    return os.access(folder, os.R_OK | os.W_OK | os.X_OK)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -96,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
     - 0: Ctrl-C or SIGTERM ended the program, or every recipient accepted its test notice.
     - 1: a recipient refused its test notice, or the program could not join the graph.
     - 73: the program cannot write the file of `--ack`.
+    - 77: this user may not acknowledge troubles of the service.
     - 78: FILE has an error.
     """
     log.start()
@@ -119,9 +123,15 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _acknowledge(state: Path, key: str) -> int:
+def _acknowledge(given: Path | None, key: str) -> int:
+    state = given or _state()
+    if given is None and state != SERVICE_STATE and SERVICE_STATE.exists():
+        told = "repeat the command with sudo, or name the folder of another notify with --state"
+        complain("notify", f"{SERVICE_STATE} is not readable for this user: {told}")
+        return os.EX_NOPERM
+    name = ACKNOWLEDGED + sha256(key.encode(errors="replace")).hexdigest()[:16]
     try:
-        files.replace(state / "acknowledged", key.encode())
+        files.replace(state / name, key.encode(errors="replace"))
     except OSError as error:
         complain("notify", f"{state} cannot be written: {error.strerror}")
         return os.EX_CANTCREAT
@@ -145,133 +155,136 @@ def _test(settings: NotifySettings) -> int:
 
 
 def _serve(args: argparse.Namespace, settings: NotifySettings) -> None:
-    desk = Desk(settings, args.state, [Courier(to) for to in settings.to])
+    state, line = (
+        args.state or _state(),
+        f"rmf-bridge notify {shlex.quote(str(args.file.absolute()))}",
+    )
+    if state == SERVICE_STATE:
+        line = f"sudo {line}"
+    elif args.state is not None:
+        line = f"{line} --state {shlex.quote(str(state.absolute()))}"
+    desk = Desk(settings, state, line, [Courier(to) for to in settings.to])
     with closing(open_graph(args, "rmf_bridge_notify")) as transport:
         ear = Ear(transport)
         site = HeardDevices(graph=command_line(args).options)
-        while True:
-            for heard in ear.listen(TURN_S):
-                site.take(heard)
-            site.pass_time(time.monotonic(), time.time())
-            desk.turn(site)
-
-
-class Courier:
-    """A sender of one recipient's notices, on a separate thread. A slow recipient delays no other
-    recipient's notices."""
-
-    def __init__(self, to: Recipient) -> None:
-        self._to = to
-        self._waiting: deque[NoticeText] = deque(maxlen=MOST_WAITING)
-        self._came = threading.Event()
-        threading.Thread(target=self._run, name=to.name, daemon=True).start()
-
-    def take(self, notice: NoticeText) -> None:
-        """Queue a notice, if its severity is high enough for this recipient."""
-        if self._to.least == "critical" and notice.severity != "critical":
-            return
-        if len(self._waiting) == MOST_WAITING:
-            logger.error(pairs("notice_dropped", to=self._to.name, title=self._waiting[0].title))
-        self._waiting.append(notice)
-        self._came.set()
-
-    def _run(self) -> None:
-        tries = 0
-        while True:
-            self._came.wait()
-            self._came.clear()
-            while self._waiting:
-                tries = 0 if self._sent(self._waiting[0]) else tries + 1
-                if tries:
-                    time.sleep(RETRY_S[min(tries, len(RETRY_S)) - 1])
-                else:
-                    self._waiting.popleft()
-
-    def _sent(self, notice: NoticeText) -> bool:
         try:
-            channels.send(self._to, notice)
-        except channels.ChannelError as error:
-            logger.error(pairs("notice_not_taken", to=self._to.name, reason=error))
-            return False
-        logger.info(pairs("notice", to=self._to.name, what=notice.event, title=notice.title))
-        return True
+            while True:
+                for heard in ear.listen(TURN_S):
+                    site.take(heard)
+                site.pass_time(time.monotonic(), time.time())
+                desk.turn(site)
+        finally:
+            desk.keep()
 
 
-class Certificates:
-    """The certificates of this machine's daemons, and those of the file of `notify`."""
+class Machine:
+    """This machine's daemons and certificates, and the certificates of the file of `notify`."""
 
     def __init__(self, others: Iterable[str]) -> None:
-        self._named = [(NOTIFY, "certificates", file) for file in others]
+        self._others = [(NOTIFY, "certificates", file) for file in others]
         self._reader = CertificateReader()
-        self._present: list[Trouble] = []
-        self._next_at = AGES_AGO
-        self.known: set[tuple[str, str]] = set()
-        """The daemons whose certificates were looked at, as (kind, name)."""
+        self._units: dict[str, str] = {}
+        self._daemons: list[daemons.DaemonStatus] = []
+        self._ended: list[Trouble] = []
+        self._daemons_at = self._files_at = AGES_AGO
+        self.known = {("daemon", NOTIFY)}
+        """The daemons that were looked at, as (kind, name)."""
 
-    def troubles(self, now: Moment) -> list[Trouble]:
-        """Return the present troubles. The files are looked at each minute."""
-        if now.at >= self._next_at:
-            self._next_at = now.at + CERTIFICATES_EVERY_S
-            found = [*daemons.daemons(directories.runtimes(), {}, now.wall)]
-            self.known = {("daemon", printable(one.name)) for one in found} | {("daemon", NOTIFY)}
-            named = [used for one in found for used in one.certificates]
-            named += self._named
-            self._present = [*of_certificates(named, self._reader.end, now.wall)]
-        return self._present
+    def troubles(self, now: Moment, heard: Container[tuple[str, str]]) -> Iterator[Trouble]:
+        """Yield the present troubles. `heard` has the devices heard since the start."""
+        files_due = now.at >= self._files_at
+        if files_due:
+            self._files_at = now.at + FILES_EVERY_S
+            self._units = daemons.units()
+        if now.at >= self._daemons_at:
+            self._daemons_at = now.at + DAEMONS_EVERY_S
+            self._daemons = [*daemons.daemons(directories.runtimes(), self._units, now.wall)]
+            self.known |= {("daemon", printable(one.name)) for one in self._daemons}
+        if files_due:
+            named = [used for one in self._daemons for used in one.certificates]
+            ends = of_certificates([*named, *self._others], self._reader.end, now.wall)
+            self._ended = [*ends]
+        yield from self._ended
+        yield from of_daemons(self._daemons, heard)
+
+
+class Kept(msgspec.Struct, frozen=True):
+    """The file of the state: the troubles that people know, and the notices that each recipient has not
+    taken yet."""
+
+    told: list[KeptTrouble]
+    waiting: dict[str, list[NoticeText]]
 
 
 class Desk:
     """A finder of new notices. At each call of `turn`, `Desk` gives the new notices to the couriers. It
-    also stores on disk which notices it has given to them."""
+    also stores on disk which notices it has given to them, and which of them still wait."""
 
-    def __init__(self, settings: NotifySettings, state: Path, couriers: list[Courier]) -> None:
-        self._settings = settings
-        self._told, self._acknowledged = state / "told.json", state / "acknowledged"
-        self._couriers = couriers
+    def __init__(
+        self, settings: NotifySettings, state: Path, command: str, couriers: Iterable[Courier]
+    ) -> None:
+        """`command`: the command that acknowledges a trouble of this `notify`, without `--ack`."""
+        self._settings, self._command, self._state = settings, command, state
+        self._couriers = dict(zip(_names(settings.to), couriers, strict=True))
         self._notices = Notices(settings)
         self._remedies = faults.for_explain()
-        self._certificates = Certificates(settings.certificates)
+        self._machine = Machine(settings.certificates)
         self._kept = b""
         with suppress(OSError, msgspec.MsgspecError):
-            self._kept = files.read(self._told, 1 << 20)
-            kept = msgspec.json.decode(self._kept, type=list[KeptTrouble])
-            self._notices.restore(kept, time.monotonic())
+            self._kept = files.read(state / TOLD, 1 << 22)
+            kept = msgspec.json.decode(self._kept, type=Kept)
+            self._notices.restore(kept.told, time.monotonic(), time.time() - time.monotonic())
+            for name, courier in self._couriers.items():
+                for notice in kept.waiting.get(name, ()):
+                    courier.take(notice)
 
     def turn(self, site: HeardDevices) -> None:
         """Look at the site once, and give new notices to the couriers."""
-        self._take_acknowledgement()
-        ended = self._certificates.troubles(site.now)
-        present = [*troubles(site, site.now, self._settings), *ended]
+        self._take_acknowledgements()
         ids: dict[tuple[str, str], str] = {
             (one.kind, printable(one.id)): one.id for one in site.stated()
         }
-        for report in site.nodes.values():
-            ids[report.subject[0], printable(report.subject[1])] = ""
-        ids |= dict.fromkeys(self._certificates.known, "")
-        for notice in self._notices.turn(present, ids, site.now.at, datetime.now().time()):
+        ours = [*self._machine.troubles(site.now, {*ids, *self._notices.silent})]
+        present = [*troubles(site, site.now, self._settings), *ours]
+        heard, at = heard_now(site, site.now) | self._machine.known, datetime.now().astimezone()
+        for notice in self._notices.turn(present, heard, site.now.at, at.time()):
             one = notice.trouble
             device = ids.get((one.kind, one.device))
             kind = next((known for known in KINDS if known == one.kind), None)
             explained = (
                 site.explain(kind, device, None, self._remedies) if kind and device else None
             )
-            text = worded(notice, explained, self._settings.page, self._remedies)
-            for courier in self._couriers:
+            page = self._settings.page
+            text = worded(notice, explained, page, self._remedies, at, self._command)
+            for courier in self._couriers.values():
                 courier.take(text)
-        self._keep()
+        self.keep()
 
-    def _take_acknowledgement(self) -> None:
-        with suppress(OSError):
-            key = files.read(self._acknowledged, 4096).decode(errors="replace")
-            self._acknowledged.unlink()
-            known = self._notices.acknowledge(key)
-            logger.info(pairs("acknowledged", trouble=key, known=known))
+    def _take_acknowledgements(self) -> None:
+        for path in sorted(self._state.glob(f"{ACKNOWLEDGED}*")):
+            with suppress(OSError):
+                key = files.read(path, 4096).decode(errors="replace")
+                known = self._notices.acknowledge(key)
+                logger.info(pairs("acknowledged", trouble=key, known=known))
+                self.keep()
+                path.unlink()  # only now, because SIGTERM may come in between
 
-    def _keep(self) -> None:
-        kept = msgspec.json.encode(self._notices.kept())
+    def keep(self) -> None:
+        """Store what has changed."""
+        told = self._notices.kept(time.time() - time.monotonic())
+        waiting = {name: courier.waiting for name, courier in self._couriers.items()}
+        kept = msgspec.json.encode(Kept(told, waiting))
         if kept != self._kept:
             try:
-                files.replace(self._told, kept)
+                files.replace(self._state / TOLD, kept)
             except OSError as error:
-                logger.error(pairs("not_kept", file=self._told, reason=error))
+                logger.error(pairs("not_kept", file=self._state / TOLD, reason=error))
             self._kept = kept
+
+
+def _names(to: Iterable[Recipient]) -> Iterator[str]:
+    """Yield a name for each recipient. Further recipients of the same name get a number."""
+    seen: Counter[str] = Counter()
+    for one in to:
+        seen[one.name] += 1
+        yield one.name if seen[one.name] == 1 else f"{one.name} ({seen[one.name]})"

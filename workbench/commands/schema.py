@@ -5,6 +5,7 @@ import argparse
 import json
 
 from workbench.commissioning import json_schema, reference
+from workbench.notify.settings import NotifySettings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,5 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the schema."""
-    print(reference.page() if args.markdown else json.dumps(json_schema.schema(), indent=2), end="")
+    print(markdown() if args.markdown else json.dumps(json_schema.schema(), indent=2), end="")
     return 0
+
+
+def markdown() -> str:
+    """Return the configuration reference."""
+    return reference.page({NotifySettings: "The file of `rmf-bridge notify`"})

@@ -6,7 +6,9 @@ structs' docstrings.
 
 import re
 from collections import Counter
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
+from types import MappingProxyType
+from typing import Final
 
 import msgspec
 from msgspec import inspect as mi
@@ -25,9 +27,14 @@ from workbench.commissioning.json_schema import (
     shared_sections,
 )
 
+NO_OTHERS: Final[Mapping[type, str]] = MappingProxyType({})
 
-def page() -> str:
-    """Return docs/reference/configuration.md. Structs that several sections share come at the end."""
+
+def page(other_files: Mapping[type, str] = NO_OTHERS) -> str:
+    """Return docs/reference/configuration.md. Structs that several sections share come at the end.
+
+    `other_files` maps the struct of each other file that a user writes to the file's title.
+    """
     rows = [f"| `{key}` | {told} |" for key, told in FILE.items()]
     sections = [
         "# Configuration reference",
@@ -42,7 +49,8 @@ def page() -> str:
         " has `kind`, `rmf`, `recording` and one section of its own.",
         "\n".join(["| key | meaning |", "|---|---|", *rows]),
     ]
-    headings = _headings(_tops())
+    others = {struct: f"## {title}" for struct, title in other_files.items()}
+    headings = _headings(_tops() | others)
     for struct, heading in headings.items():
         if not _is_of_one(heading) and SHARED not in sections:
             sections.append(SHARED)

@@ -68,7 +68,9 @@ def _states(
         DEVICE,
     )
     mode = _gauge(
-        "device_mode", "1 for the present mode (lift, door) or state (charger).", (*DEVICE, "mode")
+        "device_mode",
+        "1 for the last known mode (lift, door) or state (charger).",
+        (*DEVICE, "mode"),
     )
     simulated = _gauge("device_simulated", "1 if the device's daemon moves no hardware.", DEVICE)
     for one in devices:

@@ -13,6 +13,7 @@ from email.message import EmailMessage
 from typing import Final
 
 import msgspec
+from msgspec.structs import replace
 
 from bridges.system.user_files import SecretError, secret_line
 from workbench.notify.messages import NoticeText
@@ -36,11 +37,12 @@ def send(to: Recipient, notice: NoticeText) -> None:
     if to.mail:
         _mail(to, notice, secret)
     elif to.ntfy:
-        _post(to.ntfy, notice.text.encode(), _ntfy_headers(notice) | _bearer(secret))
+        _post(to, to.ntfy, notice.text.encode(), _ntfy_headers(notice) | _bearer(secret))
     else:
         assert to.webhook  # `Recipient.problems` refuses a recipient without ntfy, mail or webhook
         headers = {"Content-Type": "application/json"} | _bearer(secret)
-        _post(to.webhook, msgspec.json.encode(notice), headers)
+        told = replace(notice, text=f"{notice.title}\n{notice.text}")  # a chat shows only `text`
+        _post(to, to.webhook, msgspec.json.encode(told), headers)
 
 
 def _bearer(secret: str) -> dict[str, str]:
@@ -54,7 +56,7 @@ def _ntfy_headers(notice: NoticeText) -> dict[str, str]:
     return {"Title": title, "Priority": PRIORITY[notice.severity], "Tags": tag} | click
 
 
-def _post(url: str, body: bytes, headers: Mapping[str, str]) -> None:
+def _post(to: Recipient, url: str, body: bytes, headers: Mapping[str, str]) -> None:
     import requests
 
     with requests.Session() as session:
@@ -67,8 +69,9 @@ def _post(url: str, body: bytes, headers: Mapping[str, str]) -> None:
                 timeout=TIMEOUT_S,
                 allow_redirects=False,
                 stream=True,
+                verify=to.ca_file or True,
             )
-        except requests.RequestException as error:
+        except (requests.RequestException, OSError) as error:
             raise ChannelError(f"{type(error).__name__}") from None
         with answer:
             if not answer.ok or answer.is_redirect:
@@ -80,8 +83,8 @@ def _mail(to: Recipient, notice: NoticeText, password: str) -> None:
     message["Subject"], message["From"] = f"[rmf-bridges] {notice.title}", to.sender
     message["To"] = ", ".join(to.mail)
     message.set_content("\n\n".join(filter(None, (notice.text, notice.link))))
-    context = ssl.create_default_context()
     try:
+        context = ssl.create_default_context(cafile=to.ca_file)
         with _server(to, context) as server:
             if to.user:
                 server.login(to.user, password)

@@ -1,6 +1,8 @@
 """A notice as text for people: a headline, the sentences of `explain`, and the next step."""
 
+import shlex
 from collections.abc import Iterator
+from datetime import datetime
 from typing import Final
 from urllib.parse import quote
 
@@ -10,13 +12,18 @@ from bridges.messages.words import KINDS
 from workbench.explain.answer import Remedies
 from workbench.explain.explanation import Explanation
 from workbench.notify.notices import Notice
+from workbench.notify.troubles import LEFT_ON, NOT_SERVING, SILENT
 
+STATUS: Final = "run `rmf-bridge status` on the machine of its daemon, and do what it says"
+NEXT: Final = {SILENT: STATUS, NOT_SERVING: STATUS, LEFT_ON: STATUS}
+"""The next step for a trouble that no explanation covers."""
 SAYS: Final = {"new": "", "again": "Still: ", "over": "Over: "}
 MOST_SENTENCES: Final = 4
 
 
 class NoticeText(Struct, frozen=True):
-    """A notice as people receive it. `key` names the trouble for `rmf-bridge notify FILE --ack`."""
+    """A notice as people receive it. `key` names the trouble for `rmf-bridge notify FILE --ack`. `at`:
+    the local time of the notice, in ISO 8601."""
 
     event: str
     severity: str
@@ -24,26 +31,36 @@ class NoticeText(Struct, frozen=True):
     title: str
     text: str
     link: str = ""
+    at: str = ""
 
 
 def worded(
-    notice: Notice, explained: Explanation | None, page: str | None, remedies: Remedies
+    notice: Notice,
+    explained: Explanation | None,
+    page: str | None,
+    remedies: Remedies,
+    at: datetime,
+    acknowledge: str = "rmf-bridge notify FILE",
 ) -> NoticeText:
     """Write a notice in words. `explained` is the device's present explanation, or None if the device
-    is no longer known."""
+    is no longer known. `at`: the time of the notice. `acknowledge`: the command that takes `--ack`."""
     trouble = notice.trouble
-    lines = [f"The trouble has lasted {_lasted(notice.for_s)}."]
+    lasted = f"had lasted {_lasted(notice.for_s)}"
     if notice.event == "over":
-        lines = [f"The trouble lasted {_lasted(notice.for_s)}."]
+        lines = [f"At {at:%Y-%m-%d %H:%M:%S} the trouble was over; it {lasted}."]
     else:
+        lines = [f"At {at:%Y-%m-%d %H:%M:%S} the trouble {lasted}."]
         lines += _explained(explained, trouble.what, remedies)
+        if trouble.what in NEXT and explained is None:
+            lines.append(f"Next, a person: {NEXT[trouble.what]}.")
     if trouble.severity == "critical" and notice.event != "over":
-        lines.append(f"To stop the repeats: rmf-bridge notify FILE --ack '{trouble.key}'")
+        lines.append(f"To stop the repeats: {acknowledge} --ack {shlex.quote(trouble.key)}")
     link = ""
     if page and trouble.kind in KINDS:
         link = f"{page.rstrip('/')}/{trouble.kind}/{quote(trouble.device, safe='')}"
     title = SAYS[notice.event] + trouble.headline
-    return NoticeText(notice.event, trouble.severity, trouble.key, title, "\n".join(lines), link)
+    text, when = "\n".join(lines), at.isoformat(timespec="seconds")
+    return NoticeText(notice.event, trouble.severity, trouble.key, title, text, link, when)
 
 
 def _explained(explained: Explanation | None, code: str, remedies: Remedies) -> Iterator[str]:
@@ -59,7 +76,7 @@ def _explained(explained: Explanation | None, code: str, remedies: Remedies) -> 
             if step.who != "nobody" or not known:
                 yield f"Next, {step.who}: {step.what}."
         known = {one.code: (one.cause, one.do) for one in explained.faults if one.do} | known
-    yield from (f"{code}: {cause}. {do}" for code, (cause, do) in known.items())
+    yield from (f"{code}: {cause}. Do: {do}" for code, (cause, do) in known.items())
 
 
 def _lasted(seconds: float) -> str:

@@ -3,13 +3,14 @@
 NOTIFY-1. A trouble gets one notice, after the trouble has lasted `after_s`. If a trouble goes away and
 comes back within `after_s`, it counts as present without a break. NOTIFY-2. The end of a trouble gets
 one notice, after the trouble has been gone for `over_s`. Only a trouble that people know from a notice
-gets this second notice. A trouble that comes back earlier is still the same trouble. If a device was
-not heard since the start, its trouble is not gone, because nothing is known about the device. NOTIFY-3.
+gets this second notice. A trouble that comes back earlier is still the same trouble. If a device is not
+heard now, its trouble is not gone, because nothing is known about the device; then only its silence is
+told. NOTIFY-3.
 In the quiet hours, only critical troubles get a notice. A warning that still lasts gets its notice
 after the quiet hours. If a trouble ends before its first notice, the end gets no notice. NOTIFY-4. A
 critical trouble gets a notice again every `again_s`. The repeats stop when a person acknowledges the
-trouble, or when the trouble ends. NOTIFY-5. After a restart, no notice is sent twice. The program keeps
-reported troubles on disk, and counts them as reported at the start.
+trouble, or when the trouble ends. NOTIFY-5. After a restart, no notice is lost, and none is sent twice.
+The program keeps on disk the reported troubles, and the notices that a recipient has not taken yet.
 """
 
 from collections.abc import Container, Iterable
@@ -20,7 +21,7 @@ from typing import Final, Literal
 from msgspec import Struct
 
 from workbench.notify.settings import NotifySettings
-from workbench.notify.troubles import Trouble
+from workbench.notify.troubles import SILENT, Trouble
 
 MOST: Final = 1000
 """Maximum number of troubles in memory. A site has some hundred devices."""
@@ -49,10 +50,11 @@ class KnownTrouble:
 
 
 class KeptTrouble(Struct, frozen=True):
-    """A trouble on disk that was already reported to people."""
+    """A trouble on disk that was already reported to people. `since` is the wall time (s)."""
 
     trouble: Trouble
     acknowledged: bool
+    since: int
 
 
 @dataclass(slots=True)
@@ -67,8 +69,8 @@ class Notices:
     ) -> list[Notice]:
         """Take the present troubles. Return the notices that are due, the most urgent first.
 
-        `heard` has the kind and name of each device heard since the start. `clock` is the local time of
-        day.
+        `heard` has the kind and name of each device about which something is known now. `clock` is the
+        local time of day.
         """
         for trouble in present:
             before = self.known.get(trouble.key)
@@ -76,23 +78,36 @@ class Notices:
                 self.known[trouble.key] = replace(before, trouble=trouble, seen_at=now)
             elif len(self.known) < MOST:
                 self.known[trouble.key] = KnownTrouble(trouble, now, now)
+        unheard = set()
         for key, one in self.known.items():
             if one.seen_at < now and (one.trouble.kind, one.trouble.device) not in heard:
                 self.known[key] = replace(one, seen_at=now)
-        told = [notice for key in [*self.known] if (notice := self._due(key, now, clock))]
+                if one.trouble.what != SILENT:
+                    unheard.add(key)
+        due = [key for key in self.known if key not in unheard]
+        told = [notice for key in due if (notice := self._due(key, now, clock))]
         return sorted(
             told, key=lambda one: (one.trouble.severity != "critical", one.event != "new")
         )
 
-    def kept(self) -> list[KeptTrouble]:
-        """Return the troubles already reported to people, for the next start."""
-        told = (one for one in self.known.values() if one.told_at is not None)
-        return [KeptTrouble(one.trouble, one.acknowledged) for one in told]
+    @property
+    def silent(self) -> set[tuple[str, str]]:
+        """The kind and name of each device whose silence is known."""
+        known = (one.trouble for one in self.known.values())
+        return {(one.kind, one.device) for one in known if one.what == SILENT}
 
-    def restore(self, kept: Iterable[KeptTrouble], now: float) -> None:
+    def kept(self, ahead_s: float) -> list[KeptTrouble]:
+        """Return the troubles already reported to people, for the next start. `ahead_s`: the wall time
+        minus the time (s) of `turn`."""
+        told = (one for one in self.known.values() if one.told_at is not None)
+        return [KeptTrouble(o.trouble, o.acknowledged, round(o.since + ahead_s)) for o in told]
+
+    def restore(self, kept: Iterable[KeptTrouble], now: float, ahead_s: float) -> None:
         """Begin with the troubles that an earlier run reported to people."""
         for one in kept:
-            self.known[one.trouble.key] = KnownTrouble(one.trouble, now, now, now, one.acknowledged)
+            since = min(one.since - ahead_s, now)
+            known = KnownTrouble(one.trouble, since, now, now, one.acknowledged)
+            self.known[one.trouble.key] = known
 
     def acknowledge(self, key: str) -> bool:
         """Stop repeating this trouble. Return False if there is no such trouble."""
@@ -115,7 +130,7 @@ class Notices:
         else:
             return None
         self.known[key] = replace(one, told_at=now)
-        return Notice(event, one.trouble, lasts_s)
+        return Notice(event, one.trouble, one.trouble.before_s + lasts_s)
 
     def _gone(self, key: str, now: float, clock: time) -> Notice | None:
         one, s = self.known[key], self.settings
@@ -126,7 +141,7 @@ class Notices:
             return None
         del self.known[key]
         return (
-            Notice("over", one.trouble, one.seen_at - one.since)
+            Notice("over", one.trouble, one.trouble.before_s + one.seen_at - one.since)
             if one.told_at is not None
             else None
         )

@@ -72,6 +72,10 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             "a file with a bearer token or a mail password; only this program's user may read it."
         ),
     ] = None
+    ca_file: Annotated[
+        AbsolutePath | None,
+        tells("the certificate (PEM) of the server's authority, if it is not a public one."),
+    ] = None
     host: Annotated[Name | None, tells("the mail server.")] = None
     port: Annotated[
         int, Meta(ge=1, le=65535), tells("the mail server's port; TLS is required.")

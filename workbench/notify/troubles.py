@@ -1,6 +1,6 @@
 """A site's present troubles, found in the memory of its devices. All functions are pure."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from typing import Any, Final
 
 from msgspec import Struct
@@ -9,9 +9,13 @@ from bridges.messages.words import printable
 from bridges.observe.all_devices import AnyDevice, ObservedGraph
 from bridges.observe.lift import NOBODY, ObservedLift
 from bridges.observe.requesters import Moment
+from bridges.runtime.daemons import DOWN, DaemonStatus
 from bridges.system.certificates import SOON_S, URGENT_S, CertificateEnd, told
 from workbench.notify.settings import NotifySettings, Severity
 
+SILENT: Final = "SILENT"
+NOT_SERVING: Final = "NOT_SERVING"
+LEFT_ON: Final = "LEFT_ON"
 RAISED: Final = "ALARM_RAISED"
 """The fault of a daemon whose alarm makes robots stand."""
 ALARMS: Final = "ALARM_"
@@ -19,13 +23,15 @@ ALARMS: Final = "ALARM_"
 
 
 class Trouble(Struct, frozen=True):
-    """One trouble of one device. `what` is a code that stays the same as long as the trouble lasts."""
+    """One trouble of one device. `what` is a code that stays the same as long as the trouble lasts.
+    `before_s` is the time (s) for which it has lasted before it counts as a trouble."""
 
     kind: str
     device: str
     what: str
     severity: Severity
     headline: str
+    before_s: float = 0.0
 
     @property
     def key(self) -> str:
@@ -40,7 +46,7 @@ def troubles(graph: ObservedGraph[Any], now: Moment, settings: NotifySettings) -
         name = printable(one.id)
         if one.is_silent(now):
             headline = f"{one.kind} {name} is silent"
-            yield Trouble(one.kind, name, "SILENT", "critical", headline)
+            yield Trouble(one.kind, name, SILENT, "critical", headline)
             continue
         yield from _of_lift(one, name, now, settings)
         if len(one.publishers(now)) > 1:
@@ -51,7 +57,7 @@ def troubles(graph: ObservedGraph[Any], now: Moment, settings: NotifySettings) -
             yield Trouble(one.kind, name, shown, "warning", f"{one.kind} {name}: {shown}")
         if any(now.at - wait.since.at > settings.waits_s for wait in one.waits(now)):
             headline = f"a robot waits for {one.kind} {name}"
-            yield Trouble(one.kind, name, "WAITING", "warning", headline)
+            yield Trouble(one.kind, name, "WAITING", "warning", headline, settings.waits_s)
     yield from _of_nodes(graph, now)
 
 
@@ -73,8 +79,38 @@ def of_certificates(
             over = found.at is not None and found.at < now
             severity: Severity = "critical" if over and what == "WEEK" else "warning"
             headline = told(f"certificate {file} ({daemon}, {key})", found, now)
-            code = f"CERTIFICATE_{what} {key}"
+            code = printable(f"CERTIFICATE_{what} {key} {file}")
             yield Trouble("daemon", daemon, code, severity, printable(headline))
+
+
+def of_daemons(
+    found: Iterable[DaemonStatus], heard: Container[tuple[str, str]]
+) -> Iterator[Trouble]:
+    """Yield the troubles of this machine's daemons that do not serve. `heard` has the kind and name of
+    each device heard since the start.
+
+    Leave out a daemon whose devices were all heard, because `troubles` yields SILENT for each of them.
+    """
+    for one in found:
+        name, kind = printable(one.name), str(one.status.get("kind", ""))
+        if one.state == "left on":
+            headline = f"daemon {name} has died, and its outputs are not verified off"
+            yield Trouble("daemon", name, LEFT_ON, "critical", f"{headline}; {printable(one.why)}")
+        elif one.level == DOWN:
+            told = [(kind, printable(device)) in heard for device in one.devices]
+            if not told or not all(told):
+                headline = f"daemon {name} does not serve"
+                yield Trouble("daemon", name, NOT_SERVING, "critical", headline)
+
+
+def heard_now(graph: ObservedGraph[Any], now: Moment) -> set[tuple[str, str]]:
+    """Return the kind and name of each subject about which something is known now."""
+    stated = {(one.kind, printable(one.id)) for one in graph.stated() if not one.is_silent(now)}
+    return stated | {
+        (report.subject[0], printable(report.subject[1]))
+        for report in graph.nodes.values()
+        if report.is_current(now.at)
+    }
 
 
 def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:
@@ -87,7 +123,7 @@ def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:
         kind, named = report.subject[0], printable(report.subject[1])
         if kind != "daemon" and not report.is_current(now.at):
             headline = f"{kind} {named} is silent"
-            yield Trouble(kind, named, "SILENT", "critical", headline)
+            yield Trouble(kind, named, SILENT, "critical", headline)
         for code in sorted(report.faults) if report.is_current(now.at) else ():
             severity: Severity = "critical" if code == RAISED else "warning"
             shown = printable(code)
@@ -101,7 +137,7 @@ def _of_lift(one: AnyDevice, name: str, now: Moment, settings: NotifySettings) -
     facts = (one.floor, one.door, one.motion, one.mode, one.session, one.destination)
     if now.at - max(fact.since.at for fact in facts) > settings.stuck_s:
         headline = f"lift {name} has a robot and does not move"
-        yield Trouble("lift", name, "STUCK", "critical", headline)
+        yield Trouble("lift", name, "STUCK", "critical", headline, settings.stuck_s)
 
 
 def _current(one: AnyDevice, now: Moment) -> Iterator[list[str]]:

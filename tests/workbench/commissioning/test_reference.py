@@ -9,6 +9,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from bridges.settings import names as named
+from workbench.commands.schema import markdown
 from workbench.commissioning import json_schema, reference
 from workbench.commissioning.examples import device_yamls
 
@@ -72,7 +73,7 @@ def test_an_unknown_key_in_any_section_is_wrong_by_the_schema(
 
 
 def test_every_link_of_the_page_leads_to_one_heading() -> None:
-    page = reference.page()
+    page = markdown()
     titles = [line.lstrip("# ") for line in page.splitlines() if line.startswith("#")]
     anchors = Counter(re.sub(r"[^\w -]", "", t.lower()).replace(" ", "-") for t in titles)
     links = set(re.findall(r"\]\(#([^)]*)\)", page))

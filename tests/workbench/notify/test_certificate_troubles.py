@@ -41,6 +41,6 @@ def test_an_end_is_told_a_month_and_a_week_before_it_and_is_critical_afterwards(
     key = "rmf.zenoh.tls.certificate"
     found = of_certificates([("lift", key, ENDS)], lambda _: end, NOW)
     assert [(one.what, one.severity, one.headline) for one in found] == [
-        (f"CERTIFICATE_{what} {key}", severity, f"certificate {ENDS} (lift, {key}) {text}")
+        (f"CERTIFICATE_{what} {key} {ENDS}", severity, f"certificate {ENDS} (lift, {key}) {text}")
         for what, severity, text in wanted
     ]

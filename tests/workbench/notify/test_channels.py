@@ -14,6 +14,7 @@ import pytest
 import trustme
 from aiosmtpd.controller import Controller
 from aiosmtpd.smtp import AuthResult
+from msgspec.structs import replace
 
 from bridges.yaml.problems import SettingsError
 from tests.transports.zenoh_programs import free_port
@@ -44,7 +45,8 @@ def test_a_webhook_gets_json_and_ntfy_gets_its_headers(sink: Sink, token: Path) 
         "severity": "critical",
         "key": "lift Aufzug: STUCK",
         "title": "Aufzug 1 steht ✋",
-        "text": "It stands.",
+        "text": "Aufzug 1 steht ✋\nIt stands.",
+        "at": "",
         "link": "http://p/x",
     }
     assert str(make_header(decode_header(headers["Title"]))) == "Aufzug 1 steht ✋"
@@ -88,10 +90,9 @@ class Mailbox:
 
 
 @contextmanager
-def mail_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Mailbox, int]]:
+def mail_server(tmp_path: Path) -> Iterator[tuple[Mailbox, int]]:
     authority = trustme.CA()
     authority.cert_pem.write_to_path(tmp_path / "ca.pem")
-    monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "ca.pem"))
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     authority.issue_cert("localhost").configure_cert(context)
 
@@ -119,9 +120,9 @@ def mail_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tup
 
 
 def test_mail_goes_over_tls_with_its_password_and_a_wrong_one_is_an_error(
-    tmp_path: Path, token: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, token: Path
 ) -> None:
-    with mail_server(tmp_path, monkeypatch) as (box, port):
+    with mail_server(tmp_path) as (box, port):
         to = Recipient(
             mail=["lifts@h.example"],
             sender="rmf@h.example",
@@ -129,7 +130,10 @@ def test_mail_goes_over_tls_with_its_password_and_a_wrong_one_is_an_error(
             port=port,
             user="rmf",
             token_file=str(token),
+            ca_file=str(tmp_path / "ca.pem"),
         )
+        with pytest.raises(ChannelError, match="CERTIFICATE_VERIFY_FAILED"):
+            send(replace(to, ca_file=None), NOTICE)
         send(to, NOTICE)
         (mail,) = box.mails
         assert mail["Subject"] == "[rmf-bridges] Aufzug 1 steht ✋"

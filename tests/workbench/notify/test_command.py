@@ -80,7 +80,7 @@ def test_a_killed_daemon_is_told_repeated_until_acknowledged_and_over_when_it_is
         wait_until(lambda: got("again"), "the death is told again")
         acknowledge = command("notify", file, "--state", state, "--ack", told["key"])
         assert subprocess.run(acknowledge, env=environment()).returncode == os.EX_OK
-        wait_until(lambda: not (state / "acknowledged").exists(), "the acknowledgement is taken")
+        wait_until(lambda: not [*state.glob("acknowledged*")], "the acknowledgement is taken")
     sink.got.clear()
     with notify(file, state, domain), daemon(module.file, tmp_path / "one") as running:
         running.wait_for("ready")
@@ -99,3 +99,37 @@ def test_the_end_of_a_certificate_is_told(sink: Sink, tmp_path: Path, domain: in
     assert told["severity"] == "critical"
     title = f"certificate {ended} (notify, certificates) ended 3 days ago, on "
     assert told["title"].startswith(title)
+
+
+@pytest.mark.long(12)
+def test_what_a_recipient_has_not_taken_is_sent_after_a_restart(
+    sink: Sink, tmp_path: Path, domain: int
+) -> None:
+    file, state = tmp_path / "to.yaml", tmp_path / "state"
+    ended = [certificate(tmp_path / f"{n}.pem", -3.5) for n in range(2)]
+    file.write_text(f"certificates: [{ended[0]}, {ended[1]}]\n{FILE.format(url=sink.url)}")
+    sink.status = 500
+    with notify(file, state, domain):
+        wait_until(lambda: sink.got, "a notice is refused")
+    sink.status = 200
+    sink.got.clear()
+
+    def taken() -> set[str]:
+        return {json.loads(body)["key"] for _, body in sink.got}
+
+    wanted = {
+        f"daemon notify: CERTIFICATE_{what} certificates {one}"
+        for one in ended
+        for what in ("SOON", "WEEK")
+    }
+    with notify(file, state, domain):
+        wait_until(lambda: taken() == wanted, "each notice")
+        for key in wanted:
+            acknowledge = command("notify", file, "--state", state, "--ack", key)
+            assert subprocess.run(acknowledge, env=environment()).returncode == os.EX_OK
+        wait_until(lambda: not [*state.glob("acknowledged*")], "each acknowledgement is taken")
+    told = json.loads((state / "told.json").read_text())["told"]
+    assert {one["trouble"]["what"].split()[-1] for one in told if one["acknowledged"]} == {
+        str(one) for one in ended
+    }
+    assert all(one["acknowledged"] for one in told)
