@@ -102,7 +102,7 @@ class MemoryFile:
 
     def __init__(self, path: Path, instead: Path | None = None) -> None:
         self._path = path
-        self._instead = instead
+        self._instead = None if instead == path else instead
         self._once = Once()
 
     def read(self) -> bytes | None:

@@ -377,6 +377,15 @@ def test_a_record_that_the_state_directory_cannot_take_goes_to_the_runtime_direc
     assert (MemoryFile(state, runtime).read(), runtime.exists()) == (b"four", False)
 
 
+def test_the_memory_of_a_simulation_has_one_path_and_stays_there(tmp_path: Path) -> None:
+    """A simulated coordinator keeps its memory in the directory that serves a real one as a spare."""
+    path = tmp_path / "run" / "kept.json"
+    kept = MemoryFile(path, path)
+    kept.write(b"one")
+    kept.write(b"two")
+    assert MemoryFile(path, path).read() == b"two"
+
+
 def test_where_neither_directory_can_be_written_the_old_record_stands(tmp_path: Path) -> None:
     state, runtime = tmp_path / "state" / "kept.json", tmp_path / "run" / "kept.json"
     kept = MemoryFile(state, runtime)

@@ -126,10 +126,16 @@ def _all(site: HeardDevices, devices: list[tuple[Explained, str]], *, as_json: b
     if as_json:
         print(json.dumps([asdict(one) for one in told]))
         return 0
-    for sentence in site.because(TimePhrases(site.now, None).time):
-        print(sentence)
+    if not told:
+        sentences = site.because(TimePhrases(site.now, None).time)
+        print(*sentences, "No state of a device and no report about a robot was heard.", sep="\n")
+        return 0
+    shared = [text for text in told[0].now if all(text in one.now for one in told)]
+    for text in shared:
+        print(text)
     for one in told:
-        print(f"{one.kind} {one.device}: {one.now[0]}")
+        own = next((text for text in one.now if text not in shared), one.now[-1])
+        print(f"{one.kind} {one.device}: {own}")
     print("\nFor more about a device, give its name after FILE.")
     return 0
 

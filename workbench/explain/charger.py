@@ -6,12 +6,15 @@ node, or from an operator. A daemon publishes each refusal on `charger_refusals`
 (`bridges/kinds/charger/refusals.py`).
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator
 from typing import Final
 
 from bridges.kinds.charger.pad import misplaced_in
-from bridges.kinds.charger.report import FaultCause, diagnosis
+from bridges.kinds.charger.report import STATION_NEXT, FaultCause, diagnosis
+from bridges.kinds.charger_coordinator import reasons
 from bridges.observe.charger import NOBODY
+from bridges.observe.diagnosis import Diagnosis
 from workbench.explain import answer as common
 from workbench.explain import first_causes
 from workbench.explain.answer import Answer
@@ -25,17 +28,17 @@ LONG_S: Final = 120.0
 for the cause."""
 REFUSED_LATELY_S: Final = 60.0
 
-Coordinator = Mapping[str, str]
-"""Diagnostics of the coordinator. The keys are the chargers' names, and also `queue`, `schedule` and
-`assigns`."""
-
 
 def answer(
-    charger: ChargerFacts, clock: TimePhrases, around: common.OthersHeard, coordinator: Coordinator
+    charger: ChargerFacts,
+    clock: TimePhrases,
+    around: common.OthersHeard,
+    coordinator: Diagnosis | None,
 ) -> Answer:
     """Explain the charger's state at the time of the last message.
 
-    `coordinator` holds the coordinator's present diagnostics, or {} if there is no coordinator.
+    `coordinator` has the coordinator's present diagnostics. Its values are the chargers' names, and
+    also `queue`, `schedule` and `assigns`.
     """
     if charger.last_state is None:
         found = common.unheard(charger, around)
@@ -54,7 +57,8 @@ def answer(
     ):
         _next(found, charger, clock)
     _refusal(found, charger, clock)
-    _coordinated(found, charger, coordinator)
+    if coordinator is not None:
+        _coordinated(found, charger, coordinator, around)
     return found
 
 
@@ -75,6 +79,10 @@ def _next(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         case "idle":
             _idle(found, charger, clock)
         case "assigned":
+            waits = charger.waits_said(clock.now).get("charger", "")
+            if STATION_NEXT in waits and charger.told("in_range", clock.now) == "yes":
+                found.acts("the controller", f"begin to charge {who}, who stands there in range")
+                return
             found.say(f"{who} has not come to the pad of {charger.name}, or cannot be charged yet.")
             long = clock.now.at - charger.condition.since.at > LONG_S
             comes = NextStep("the robot", f"{who} has to come to {charger.name} and park exactly")
@@ -84,10 +92,12 @@ def _next(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
             found.next.append(NextStep("a person", look) if long else comes)
         case "charging":
             left = f"in {lasted(charger.full_in_s)}" if charger.full_in_s > 0 else "when it is full"
+            robot = "A robot that nobody has named" if who == NOBODY else who
+            cancelled = ", or when it is cancelled" if charger.request.value else ""
             found.say(
-                f"{who} is being charged.",
+                f"{robot} is being charged.",
                 "the controller",
-                f"end the charge {left}, or when it is cancelled",
+                f"end the charge {left}{cancelled}",
             )
         case "released":
             found.say(
@@ -170,12 +180,32 @@ def _refusal(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
     )
 
 
-def _coordinated(found: Answer, charger: ChargerFacts, coordinator: Coordinator) -> None:
-    """Add the coordinator's texts about this charger, about the queue, and about the schedule."""
-    of_it = coordinator.get(charger.id, "")
+def _coordinated(
+    found: Answer, charger: ChargerFacts, coordinator: Diagnosis, around: common.OthersHeard
+) -> None:
+    """Add the coordinator's texts about this charger, about the queue, and about the schedule. Add the
+    coordinator's faults that name this charger, each with its next step."""
+    of_it = coordinator.values.get(charger.id, "")
     if of_it:
         found.say(f"The coordinator lists {charger.name} as {label(of_it)}.")
     for key, text in (("queue", "The queue: "), ("schedule", "The schedule: ")):
-        told = coordinator.get(key, "-")
-        if told not in ("-", ""):
+        told = coordinator.value(key)
+        if told:
             found.say(text + label(told, 300) + ".")
+    steps = [*_of_faults(found, charger, coordinator, around)]
+    gone = reasons.MAY_BE_GONE.format(station=charger.id)
+    if gone in coordinator.value("queue"):
+        steps.append("look whether that robot is gone; if so, reset the coordinator")
+    if steps:
+        found.next = [step for step in found.next if step.who != "nobody"]
+        found.next += [NextStep("a person", step) for step in steps]
+
+
+def _of_faults(
+    found: Answer, charger: ChargerFacts, coordinator: Diagnosis, around: common.OthersHeard
+) -> Iterator[str]:
+    named = re.compile(rf"(?<!\w){re.escape(charger.id)}(?!\w)")
+    for code, (detail, _) in coordinator.faults.items():
+        if named.search(detail):
+            found.say(f"The coordinator has the fault {code}: {label(detail, 300)}.")
+            yield around.remedies[code][1] if code in around.remedies else f"mend {code}"

@@ -26,6 +26,8 @@ OPENS_S, MOVES_S = 5.0, 15.0
 """Normal times (s) of a door that nobody holds. OPENS_S is the time for which the door stays OPEN.
 MOVES_S is the time for which the door moves."""
 AWAY: Final = ("offline", "unknown")
+DOOR: Final = "door"
+"""The kind of the door's own daemon, whose reason to wait means that it wants the door open."""
 
 
 def answer(
@@ -56,7 +58,8 @@ def answer(
     if len(door.flaps(clock.now)) < FLAPS and (old := common.old_reading(door, clock)):
         found.say(old)
     held_open = door.holders or claim or (door.asked and door.asked.value == OPEN)
-    end = "open" if held_open else "shut"
+    waits = DOOR in door.waits_said(clock.now)
+    end = "open" if held_open or waits else "shut"
     if (
         first_causes.two_nodes(found, door, clock, around, "door_states")
         or first_causes.comes_and_goes(found, door, clock)
@@ -191,14 +194,28 @@ def _nobody_asks(
 ) -> None:
     asked = door.asked.value if door.asked else ""
     for_s = clock.now.at - door.mode.since.at
-    if door.holders:
+    if door.holders and (door.mode.value == OPEN or asked == CLOSED):
         _held_open(found, door, clock)
     elif door.last_heartbeat is None and asked == OPEN:
         _asked_open(found, door, clock)
+    elif door.holders or DOOR in door.waits_said(clock.now):
+        found.say(
+            f"OPEN is wanted, and the door has been {door.mode.value} {clock.since(door.mode.since)}"
+            f"{common.relays(door, clock)}.",
+            "the controller",
+            f"open {door.name} fully, so that its contact shows OPEN",
+        )
     elif door.mode.value == CLOSED:
         found.say("Nobody waits for the door.", "nobody", "there is nothing to do")
-    elif door.last_heartbeat is None and not door.asks_now(clock.now):
+    elif door.last_heartbeat is None and not asked and not door.asks_now(clock.now):
         _nobody_tells(found, door, clock, around)
+    elif not door.mode.since.seen and for_s <= MOVES_S:
+        found.say(
+            "No robot holds the door. It may close in a moment. If it does not, a push button, somebody"
+            " in the doorway or the door's own controller keeps it open.",
+            "nobody",
+            "listen for longer",
+        )
     elif for_s <= (OPENS_S if door.mode.value == OPEN else MOVES_S):
         found.say(
             "No robot holds the door, so the door closes or will close in a moment.",

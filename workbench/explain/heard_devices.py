@@ -18,7 +18,7 @@ from bridges.messages import words
 from bridges.messages.heard import Heard, Own
 from bridges.messages.words import KINDS, Kind
 from bridges.observe.all_devices import Key, ObservedGraph
-from bridges.observe.diagnosis import COORDINATOR
+from bridges.observe.diagnosis import COORDINATOR, Diagnosis
 from bridges.observe.limits import FLAPS, MOST_DEVICES
 from bridges.observe.requesters import Moment
 from bridges.observe.robots import ObservedRobot, robots, waits
@@ -140,7 +140,7 @@ class HeardDevices(ObservedGraph[Device]):
         stated = [kind for kind in found if self.known[kind, name].state is not None]  # type: ignore[index]
         if self.robot(name):
             stated.append("robot")
-        return stated or found or (["charger"] if name in self._coordinates() else [])
+        return stated or found or (["charger"] if self._lists(name) else [])
 
     def robot(self, name: str) -> ObservedRobot | None:
         """Return the robot of this name, FLEET/ROBOT or ROBOT alone."""
@@ -237,7 +237,7 @@ class HeardDevices(ObservedGraph[Device]):
             case DoorFacts():
                 return door.answer(device, clock, around, self._session)
             case ChargerFacts():
-                return charger.answer(device, clock, around, self._coordinates())
+                return charger.answer(device, clock, around, self._coordinator())
             case WorkcellFacts():
                 return workcell.answer(device, clock, around)
         raise AssertionError(device)
@@ -295,11 +295,15 @@ class HeardDevices(ObservedGraph[Device]):
             if name in ("", device.id) and key not in self._then:
                 self._then[key] = self.now, deepcopy(device), {**self.spoke}
 
-    def _coordinates(self) -> Mapping[str, str]:
+    def _lists(self, name: str) -> bool:
+        coordinator = self._coordinator()
+        return coordinator is not None and name in coordinator.values
+
+    def _coordinator(self) -> Diagnosis | None:
         found = [one for one in self.nodes.values() if one.kind == COORDINATOR]
         said = [one for one in found if not one.name.endswith(": daemon")]
         now = [one for one in said if one.is_current(self.now.at)]
-        return max(now, key=lambda one: one.last.at).values if now else {}
+        return max(now, key=lambda one: one.last.at, default=None)
 
     def _stepped(self, clock: TimePhrases) -> tuple[str, ...]:
         return tuple(

@@ -6,6 +6,7 @@ RMF's ChargerState has one text for all errors. From that text the coordinator
 """
 
 from enum import StrEnum
+from typing import Final
 
 import msgspec
 from msgspec.structs import replace
@@ -37,6 +38,9 @@ LOST = {
 """Fault codes of stations that cannot be reached or commanded, with the fixed error messages for RMF.
 The text of such an error is only in the fault's detail."""
 OUT_OF_SERVICE = "out of service after: "
+
+STATION_NEXT: Final = "for the station to charge"
+"""The beginning of the reason for a robot that only the station keeps waiting."""
 
 
 class FaultCause(StrEnum):
@@ -144,7 +148,7 @@ def _waits(memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimit
     if not_ready:
         return f"because {not_ready}"
     ready = holder.started or cleared_to_start(memory, limits)
-    return f"for the station to charge {who}" if ready else f"for {who} in range"
+    return f"{STATION_NEXT} {who}" if ready else f"for {who} in range"
 
 
 def state(memory: ChargerMemory) -> ChargerStateValue:

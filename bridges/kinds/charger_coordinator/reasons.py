@@ -26,6 +26,9 @@ from bridges.kinds.charger_coordinator.queue import (
 from bridges.kinds.shared.durations import NEVER
 
 MOST: Final = 4
+MAY_BE_GONE: Final = (
+    " was last seen at {station} and its fleet says nothing of it (if it is gone, reset)"
+)
 """The greatest number of stations that the queue shows for one robot."""
 
 
@@ -80,7 +83,7 @@ def where(memory: SiteMemory, robot: RobotName, station: str, now: float) -> str
     silent, because only a person knows whether that robot is still there."""
     if not memory.unheard(robot, now):
         return f"{robot} stands at {station}"
-    return f"{robot} was last seen at {station} and its fleet is silent (if it is gone, reset)"
+    return f"{robot}{MAY_BE_GONE.format(station=station)}"
 
 
 def _lasts(seconds: float) -> str:

@@ -113,7 +113,7 @@ class MqttPoint(
             for values, means in ((self.when, True), (self.when_not, False)):
                 if any(json_fields.same(value, one) for one in values):
                     return means
-            wanted = " or ".join(map(str, [*self.when, *self.when_not])) or "true or false"
+            wanted = " or ".join(map(repr, [*self.when, *self.when_not])) or "true or false"
             raise json_fields.wrong(self.field or WHOLE, value, wanted)
         except DriverError as error:
             raise HalError(f"{self.topic}: {error}") from None
@@ -152,6 +152,13 @@ def _state_problems(point: MqttPoint) -> Remarks:
     for value in point.when:
         if any(json_fields.same(value, other) for other in point.when_not):
             yield ("when_not",), f"{value} is in when too"
+    for key in ("when", "when_not"):
+        for value in getattr(point, key) if point.field is None else ():
+            if isinstance(value, str) and not isinstance(decoded(value.encode()), str):
+                yield (
+                    (key,),
+                    f"write {value} without quotes: this payload is a number, true, false or null",
+                )
     if point.topic is None and (point.field or point.when or point.ask or point.availability):
         yield (), "field, when, ask and availability belong to a state: add topic"
 

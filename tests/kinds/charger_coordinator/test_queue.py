@@ -54,7 +54,9 @@ def test_a_station_with_another_robot_on_its_pad_is_not_free() -> None:
     assert site_.run(1) == [(11.0, "charger_a: AMR01")]
 
 
-GONE = "tiny/AMR02 was last seen at charger_a and its fleet is silent (if it is gone, reset)"
+GONE = (
+    "tiny/AMR02 was last seen at charger_a and its fleet says nothing of it (if it is gone, reset)"
+)
 
 
 def silent_at_a() -> Alone:

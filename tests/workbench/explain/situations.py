@@ -16,6 +16,7 @@ from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.messages.words import Kind
+from bridges.runtime.diagnostics import diagnosis
 from tests.site.network import Place
 from tests.site.timeline import EPOCH
 from tests.workbench.explain.story import Guest, Scene
@@ -275,6 +276,56 @@ def door_held_open_by_a_person() -> Case:
     return scene.heard, "door", "ward"
 
 
+def door_asked_once_stays_shut() -> Case:
+    """A dashboard has asked the supervisor for the door once, before the listener began. The door stays
+    shut."""
+    scene = Scene("ward")
+    scene.fail("ward", "operator", "stuck")
+    scene.says(topics.ADAPTER_DOOR_REQUESTS, _door("ward", d.DoorModeValue.MODE_OPEN))
+    scene.run(4.0)
+    scene.heard.clear()
+    scene.run(4.0)
+    return scene.heard, "door", "ward"
+
+
+def door_told_directly_stays_shut() -> Case:
+    """No supervisor runs. A person has sent OPEN to the door's daemon before the listener began. The
+    door stays shut."""
+    scene = Scene("ward")
+    scene.supervisors["door_supervisor"].kill()
+    scene.fail("ward", "operator", "stuck")
+    scene.says(topics.DOOR_REQUESTS, _door("ward", d.DoorModeValue.MODE_OPEN))
+    scene.run(4.0)
+    scene.heard.clear()
+    scene.run(4.0)
+    return scene.heard, "door", "ward"
+
+
+def door_let_go_is_kept_open() -> Case:
+    """No supervisor runs. A person has sent OPEN and then CLOSE, and a push button keeps the door
+    open."""
+    scene = Scene("ward")
+    scene.supervisors["door_supervisor"].kill()
+    scene.says(topics.DOOR_REQUESTS, _door("ward", d.DoorModeValue.MODE_OPEN))
+    scene.run(6.0)
+    scene.press("ward", "push", True)
+    scene.says(topics.DOOR_REQUESTS, _door("ward", d.DoorModeValue.MODE_CLOSED))
+    scene.run(30.0)
+    return scene.heard, "door", "ward"
+
+
+def coordinator_gave_up_on_a_robot() -> Case:
+    """Nobody requests the charger, because the coordinator tries its robot no more."""
+    scene = Scene("bay1")
+    detail = "fleet/red failed at bay1 and bay2: not tried again"
+    site = {"bay1": "IDLE", "faults": [{"code": "ROBOT_FAULTY", "detail": detail}]}
+    told = diagnosis("coordinator", "charger_coordinator", {}, {"": site}, d.Time())
+    for _ in range(8):
+        scene.says(topics.DIAGNOSTICS, told)
+        scene.run(1.0)
+    return scene.heard, "charger", "bay1"
+
+
 def charger_refuses() -> Case:
     """A second robot asks for a charger that is promised to another robot."""
     scene = Scene("bay1")
@@ -337,6 +388,10 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         door_does_not_open,
         door_without_supervisor,
         door_held_open_by_a_person,
+        door_asked_once_stays_shut,
+        door_told_directly_stays_shut,
+        door_let_go_is_kept_open,
+        coordinator_gave_up_on_a_robot,
         charger_refuses,
         wrong_station,
         coordinator_queues,
@@ -361,6 +416,10 @@ def _two(lift: str) -> tuple[Scene, Guest, Guest]:
     scene.run(2.0)
     blue.asks(lift, "L1")
     return scene, red, blue
+
+
+def _door(door: str, mode: int) -> d.DoorRequest:
+    return d.DoorRequest(d.Time(), "dashboard", door, d.DoorMode(mode))
 
 
 def _charge(charger: str, robot: str, request: str) -> d.ChargerRequest:

@@ -127,7 +127,7 @@ class Broker:
     def listed(self) -> Iterator[str]:
         """Yield the definition of each point. A relay's device switches the relay off if the daemon
         stops repeating the command."""
-        words = "when: ['1'], when_not: ['0'], stale_after_s: 5"
+        words = "when: [1], when_not: [0], stale_after_s: 5"
         yield "    points:                  # write the topics and payloads of your device"
         for number in range(1, self._inputs + 1):
             yield f"      input {number}: {{topic: {self._topic}/input/{number}, {words}}}"

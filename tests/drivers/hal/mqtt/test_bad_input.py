@@ -84,9 +84,11 @@ def test_a_word_that_is_neither_on_nor_off_is_a_fault() -> None:
         *(False, False, False),
     ]
     assert fault(words, b"on") == (
-        "relay/state: 'payload' is 'on', and ON or 1 or OFF or 0 is expected"
+        "relay/state: 'payload' is 'on', and 'ON' or 1 or 'OFF' or 0 is expected"
     )
-    assert fault(words, b"true").endswith("'payload' is true, and ON or 1 or OFF or 0 is expected")
+    assert fault(words, b"true").endswith(
+        "'payload' is true, and 'ON' or 1 or 'OFF' or 0 is expected"
+    )
 
 
 @settings(max_examples=examples(300))

@@ -42,6 +42,10 @@ def test_a_state_needs_its_age() -> None:
 def test_the_values_for_on_and_off_need_each_other_and_differ() -> None:
     text = "needs when_not, and when_not needs when: a value in neither list is a fault"
     assert point_problems(**STATE, when=["ON"]) == [(("when",), text)]
+    assert point_problems(**STATE, when=["on"], when_not=["off"]) == []
+    told = "write 1 without quotes: this payload is a number, true, false or null"
+    assert point_problems(**STATE, when=["1"], when_not=["off"]) == [(("when",), told)]
+    assert point_problems(**STATE, field="x", when=["1"], when_not=["0"]) == []
     both = point_problems(**STATE, when=["ON", 1], when_not=[1])
     assert both == [(("when_not",), "1 is in when too")]
 
