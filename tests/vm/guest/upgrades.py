@@ -217,8 +217,8 @@ def full_var() -> str:
 
 def cut() -> str:
     """Let the power fail at a random moment of an upgrade or a downgrade."""
-    target = debs((NEXT, BEFORE)[version().endswith(".1")])
-    TARGET.write_text(" ".join(map(str, target)))
+    folder = (NEXT, BEFORE)[version().endswith(".1")]
+    TARGET.write_text(folder)
     _held()
     sh("sync")
     moment = random.SystemRandom().uniform(0, UPGRADE_S)
@@ -226,7 +226,7 @@ def cut() -> str:
     os.sync()
     words = f"sleep {moment}; echo b > /proc/sysrq-trigger"
     sh("systemd-run", "sh", "-c", words)
-    sh("systemd-run", *FORCE, *map(str, target))
+    sh("systemd-run", *FORCE, *map(str, debs(folder)))
     return "soon"
 
 
@@ -246,7 +246,7 @@ def completed() -> str:
     if "half-installed" not in state:
         sh("dpkg", "--configure", "-a")
     if not _is_whole():
-        sh(*FORCE, *TARGET.read_text().split())
+        _force(TARGET.read_text())  # the folder of packages is not mounted after a boot
     _wires_back()
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is back")
     trees = os.listdir(CURRENT.parent / "trees")
