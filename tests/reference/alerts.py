@@ -8,7 +8,7 @@ import yaml
 from bridges.blackbox.recordings import LEAST_FREE
 from bridges.runtime import faults
 from bridges.system.certificates import DAY_S, SOON_S, URGENT_S
-from workbench.notify.troubles import RAISED
+from workbench.notify.troubles import severity_of
 
 HEAD: Final = """\
 # Alert rules for Prometheus (docs/how-to/monitor.md). `make reference` makes this file from
@@ -165,8 +165,8 @@ def _faults() -> Iterator[dict[str, Any]]:
         name = "".join(part.capitalize() for part in code.split("_"))
         about = "{{ $labels.kind }} {{ $labels.device }}"
         summary = f"{about}: {_plain(remedy.cause)}."
-        severity = "critical" if code == RAISED else "warning"  # as `notify` has it
-        yield _rule(f"Fault{name}", f"{metric} == 1", "1m", severity, summary, _plain(remedy.do))
+        do = _plain(remedy.do)
+        yield _rule(f"Fault{name}", f"{metric} == 1", "1m", severity_of(code), summary, do)
 
 
 def _rule(

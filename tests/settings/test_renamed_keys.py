@@ -13,7 +13,7 @@ from bridges.settings.load import load
 from bridges.settings.renamed_keys import RENAMED, RenamedKey
 from drivers.charger.can_frames import frame_map
 from tests.settings.reading import RIGHT, problems_of
-from workbench.commissioning import reference
+from workbench.commands.schema import markdown
 
 ROOT = Path(__file__).parents[2]
 WIFERION = ROOT / "drivers/profiles/wiferion.yaml"
@@ -216,7 +216,7 @@ def test_each_row_is_of_this_or_the_last_major_version_and_its_new_key_exists(
     row: RenamedKey,
 ) -> None:
     assert int(row.since.split(".")[0]) >= int(__version__.split(".")[0]) - 1, "delete the row"
-    known = reference.page()
+    known = markdown()
     assert f"`{row.now.split('.')[-1]}`" in known
     assert f"`{row.was.split('.')[-1]}`" not in known
 

@@ -86,11 +86,8 @@ def _state() -> Path:
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     if given:
         return Path(given)
-    return SERVICE_STATE if _is_ours(SERVICE_STATE) else directories.state_base() / "notify"
-
-
-def _is_ours(folder: Path) -> bool:
-    return os.access(folder, os.R_OK | os.W_OK | os.X_OK)
+    service = os.access(SERVICE_STATE, os.R_OK | os.W_OK | os.X_OK)
+    return SERVICE_STATE if service else directories.state_base() / "notify"
 
 
 def run(args: argparse.Namespace) -> int:
@@ -155,15 +152,13 @@ def _test(settings: NotifySettings) -> int:
 
 
 def _serve(args: argparse.Namespace, settings: NotifySettings) -> None:
-    state, line = (
-        args.state or _state(),
-        f"rmf-bridge notify {shlex.quote(str(args.file.absolute()))}",
-    )
+    state = args.state or _state()
+    command = f"rmf-bridge notify {shlex.quote(str(args.file.absolute()))}"
     if state == SERVICE_STATE:
-        line = f"sudo {line}"
+        command = f"sudo {command}"
     elif args.state is not None:
-        line = f"{line} --state {shlex.quote(str(state.absolute()))}"
-    desk = Desk(settings, state, line, [Courier(to) for to in settings.to])
+        command += f" --state {shlex.quote(str(state.absolute()))}"
+    desk = Desk(settings, state, command, [Courier(to) for to in settings.to])
     with closing(open_graph(args, "rmf_bridge_notify")) as transport:
         ear = Ear(transport)
         site = HeardDevices(graph=command_line(args).options)
@@ -233,7 +228,7 @@ class Desk:
         with suppress(OSError, msgspec.MsgspecError):
             self._kept = files.read(state / TOLD, 1 << 22)
             kept = msgspec.json.decode(self._kept, type=Kept)
-            self._notices.restore(kept.told, time.monotonic(), time.time() - time.monotonic())
+            self._notices.restore(kept.told, time.monotonic(), _ahead_s())
             for name, courier in self._couriers.items():
                 for notice in kept.waiting.get(name, ()):
                     courier.take(notice)
@@ -271,7 +266,7 @@ class Desk:
 
     def keep(self) -> None:
         """Store what has changed."""
-        told = self._notices.kept(time.time() - time.monotonic())
+        told = self._notices.kept(_ahead_s())
         waiting = {name: courier.waiting for name, courier in self._couriers.items()}
         kept = msgspec.json.encode(Kept(told, waiting))
         if kept != self._kept:
@@ -280,6 +275,11 @@ class Desk:
             except OSError as error:
                 logger.error(pairs("not_kept", file=self._state / TOLD, reason=error))
             self._kept = kept
+
+
+def _ahead_s() -> float:
+    """Return how far the wall clock is ahead of the monotonic clock."""
+    return time.time() - time.monotonic()
 
 
 def _names(to: Iterable[Recipient]) -> Iterator[str]:

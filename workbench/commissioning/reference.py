@@ -7,8 +7,6 @@ structs' docstrings.
 import re
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping
-from types import MappingProxyType
-from typing import Final
 
 import msgspec
 from msgspec import inspect as mi
@@ -27,10 +25,8 @@ from workbench.commissioning.json_schema import (
     shared_sections,
 )
 
-NO_OTHERS: Final[Mapping[type, str]] = MappingProxyType({})
 
-
-def page(other_files: Mapping[type, str] = NO_OTHERS) -> str:
+def page(other_files: Mapping[type, str]) -> str:
     """Return docs/reference/configuration.md. Structs that several sections share come at the end.
 
     `other_files` maps the struct of each other file that a user writes to the file's title.

@@ -208,4 +208,5 @@ def _of_faults(
     for code, (detail, _) in coordinator.faults.items():
         if named.search(detail):
             found.say(f"The coordinator has the fault {code}: {label(detail, 300)}.")
-            yield around.remedies[code][1] if code in around.remedies else f"mend {code}"
+            _, do = around.remedies.get(code, ("", f"mend {code}"))
+            yield do

@@ -139,17 +139,22 @@ def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePh
             f"send OPEN for {door.name}",
         )
         return
-    on = common.relays(door, clock)
-    found.say(
-        f"The supervisor asks for OPEN, and the door has been {door.mode.value}"
-        f" {clock.since(door.mode.since)}{on}.",
-        "the controller",
-        f"open {door.name} fully, so that its contact shows OPEN",
-    )
+    _stays_shut(found, door, clock, "The supervisor asks for OPEN")
     if clock.now.at - door.mode.since.at > LONG_S:
         found.say(
             "The door should be open by now. The cause may be an obstacle, a lock, or a dead contact."
         )
+
+
+def _stays_shut(found: Answer, door: DoorFacts, clock: TimePhrases, asked: str) -> None:
+    """Explain a door that is asked to open and does not. `asked` says who asks."""
+    since, on = clock.since(door.mode.since), common.relays(door, clock)
+    found.say(f"{asked}, and the door has been {door.mode.value} {since}{on}.")
+    found.next.append(_opens_fully(door))
+
+
+def _opens_fully(door: DoorFacts) -> NextStep:
+    return NextStep("the controller", f"open {door.name} fully, so that its contact shows OPEN")
 
 
 def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
@@ -199,12 +204,7 @@ def _nobody_asks(
     elif door.last_heartbeat is None and asked == OPEN:
         _asked_open(found, door, clock)
     elif door.holders or DOOR in door.waits_said(clock.now):
-        found.say(
-            f"OPEN is wanted, and the door has been {door.mode.value} {clock.since(door.mode.since)}"
-            f"{common.relays(door, clock)}.",
-            "the controller",
-            f"open {door.name} fully, so that its contact shows OPEN",
-        )
+        _stays_shut(found, door, clock, "OPEN is wanted")
     elif door.mode.value == CLOSED:
         found.say("Nobody waits for the door.", "nobody", "there is nothing to do")
     elif door.last_heartbeat is None and not asked and not door.asks_now(clock.now):
@@ -279,8 +279,7 @@ def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
         f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
     )
     opened = NextStep("the robot", "drive through; then its fleet adapter sends CLOSE")
-    opens = NextStep("the controller", f"open {door.name} fully, so that its contact shows OPEN")
-    found.next.append(opened if door.mode.value == OPEN else opens)
+    found.next.append(opened if door.mode.value == OPEN else _opens_fully(door))
 
 
 def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:

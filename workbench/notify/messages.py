@@ -14,9 +14,10 @@ from workbench.explain.explanation import Explanation
 from workbench.notify.notices import Notice
 from workbench.notify.troubles import LEFT_ON, NOT_SERVING, SILENT
 
-STATUS: Final = "run `rmf-bridge status` on the machine of its daemon, and do what it says"
-NEXT: Final = {SILENT: STATUS, NOT_SERVING: STATUS, LEFT_ON: STATUS}
-"""The next step for a trouble that no explanation covers."""
+NEXT: Final = (
+    "Next, a person: run `rmf-bridge status` on the machine of its daemon, and do what it says."
+)
+"""The next step for a daemon that is silent or dead, and that no explanation covers."""
 SAYS: Final = {"new": "", "again": "Still: ", "over": "Over: "}
 MOST_SENTENCES: Final = 4
 
@@ -40,7 +41,7 @@ def worded(
     page: str | None,
     remedies: Remedies,
     at: datetime,
-    acknowledge: str = "rmf-bridge notify FILE",
+    acknowledge: str,
 ) -> NoticeText:
     """Write a notice in words. `explained` is the device's present explanation, or None if the device
     is no longer known. `at`: the time of the notice. `acknowledge`: the command that takes `--ack`."""
@@ -51,8 +52,8 @@ def worded(
     else:
         lines = [f"At {at:%Y-%m-%d %H:%M:%S} the trouble {lasted}."]
         lines += _explained(explained, trouble.what, remedies)
-        if trouble.what in NEXT and explained is None:
-            lines.append(f"Next, a person: {NEXT[trouble.what]}.")
+        if trouble.what in (SILENT, NOT_SERVING, LEFT_ON) and explained is None:
+            lines.append(NEXT)
     if trouble.severity == "critical" and notice.event != "over":
         lines.append(f"To stop the repeats: {acknowledge} --ack {shlex.quote(trouble.key)}")
     link = ""

@@ -5,12 +5,12 @@ comes back within `after_s`, it counts as present without a break. NOTIFY-2. The
 one notice, after the trouble has been gone for `over_s`. Only a trouble that people know from a notice
 gets this second notice. A trouble that comes back earlier is still the same trouble. If a device is not
 heard now, its trouble is not gone, because nothing is known about the device; then only its silence is
-told. NOTIFY-3.
-In the quiet hours, only critical troubles get a notice. A warning that still lasts gets its notice
-after the quiet hours. If a trouble ends before its first notice, the end gets no notice. NOTIFY-4. A
-critical trouble gets a notice again every `again_s`. The repeats stop when a person acknowledges the
-trouble, or when the trouble ends. NOTIFY-5. After a restart, no notice is lost, and none is sent twice.
-The program keeps on disk the reported troubles, and the notices that a recipient has not taken yet.
+told. NOTIFY-3. In the quiet hours, only critical troubles get a notice. A warning that still lasts gets
+its notice after the quiet hours. If a trouble ends before its first notice, the end gets no notice.
+NOTIFY-4. A critical trouble gets a notice again every `again_s`. The repeats stop when a person
+acknowledges the trouble, or when the trouble ends. NOTIFY-5. After a restart, no notice is lost, and
+none is sent twice. The program keeps on disk the reported troubles, and the notices that a recipient
+has not taken yet.
 """
 
 from collections.abc import Container, Iterable

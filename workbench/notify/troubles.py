@@ -22,6 +22,11 @@ ALARMS: Final = "ALARM_"
 """The first letters of the fault codes whose details say why robots stand."""
 
 
+def severity_of(code: str) -> Severity:
+    """Return the severity of a fault of a panel, robot, coordinator or daemon."""
+    return "critical" if code == RAISED else "warning"
+
+
 class Trouble(Struct, frozen=True):
     """One trouble of one device. `what` is a code that stays the same as long as the trouble lasts.
     `before_s` is the time (s) for which it has lasted before it counts as a trouble."""
@@ -125,10 +130,10 @@ def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:
             headline = f"{kind} {named} is silent"
             yield Trouble(kind, named, SILENT, "critical", headline)
         for code in sorted(report.faults) if report.is_current(now.at) else ():
-            severity: Severity = "critical" if code == RAISED else "warning"
             shown = printable(code)
             detail = f": {printable(report.faults[code][0])}" if code.startswith(ALARMS) else ""
-            yield Trouble(kind, named, shown, severity, f"{kind} {named}: {shown}{detail}")
+            headline = f"{kind} {named}: {shown}{detail}"
+            yield Trouble(kind, named, shown, severity_of(code), headline)
 
 
 def _of_lift(one: AnyDevice, name: str, now: Moment, settings: NotifySettings) -> Iterator[Trouble]:

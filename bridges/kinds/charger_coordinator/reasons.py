@@ -26,10 +26,11 @@ from bridges.kinds.charger_coordinator.queue import (
 from bridges.kinds.shared.durations import NEVER
 
 MOST: Final = 4
+"""The greatest number of stations that the queue shows for one robot."""
 MAY_BE_GONE: Final = (
     " was last seen at {station} and its fleet says nothing of it (if it is gone, reset)"
 )
-"""The greatest number of stations that the queue shows for one robot."""
+"""The end of the clause about a robot of which its fleet says nothing."""
 
 
 def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
@@ -79,8 +80,8 @@ def _obstacle(memory: SiteMemory, station: str, robot: RobotName, now: float, he
 
 
 def where(memory: SiteMemory, robot: RobotName, station: str, now: float) -> str:
-    """Return a clause such as `tiny/AMR02 stands at charger_a`. It says so if the robot's fleet is
-    silent, because only a person knows whether that robot is still there."""
+    """Return a clause such as `tiny/AMR02 stands at charger_a`. It says so if the robot's fleet says
+    nothing of it, because only a person knows whether that robot is still there."""
     if not memory.unheard(robot, now):
         return f"{robot} stands at {station}"
     return f"{robot}{MAY_BE_GONE.format(station=station)}"

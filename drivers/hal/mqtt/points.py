@@ -152,15 +152,19 @@ def _state_problems(point: MqttPoint) -> Remarks:
     for value in point.when:
         if any(json_fields.same(value, other) for other in point.when_not):
             yield ("when_not",), f"{value} is in when too"
-    for key in ("when", "when_not"):
-        for value in getattr(point, key) if point.field is None else ():
-            if isinstance(value, str) and not isinstance(decoded(value.encode()), str):
-                yield (
-                    (key,),
-                    f"write {value} without quotes: this payload is a number, true, false or null",
-                )
+    if point.field is None:
+        yield from _quoted("when", point.when)
+        yield from _quoted("when_not", point.when_not)
     if point.topic is None and (point.field or point.when or point.ask or point.availability):
         yield (), "field, when, ask and availability belong to a state: add topic"
+
+
+def _quoted(key: str, values: list[Value]) -> Remarks:
+    """Yield a problem for each text that no payload can be, because JSON decodes this payload."""
+    for value in values:
+        if isinstance(value, str) and not isinstance(decoded(value.encode()), str):
+            text = f"write {value} without quotes: this payload is a number, true, false or null"
+            yield (key,), text
 
 
 def _relay_problems(point: MqttPoint) -> Remarks:

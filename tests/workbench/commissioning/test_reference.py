@@ -10,7 +10,7 @@ from jsonschema import Draft202012Validator
 
 from bridges.settings import names as named
 from workbench.commands.schema import markdown
-from workbench.commissioning import json_schema, reference
+from workbench.commissioning import json_schema
 from workbench.commissioning.examples import device_yamls
 
 ROOT = Path(__file__).parents[3]
@@ -82,12 +82,12 @@ def test_every_link_of_the_page_leads_to_one_heading() -> None:
 
 
 def test_what_several_sections_have_stands_once() -> None:
-    rows = [line for line in reference.page().splitlines() if line.startswith("| `point` |")]
+    rows = [line for line in markdown().splitlines() if line.startswith("| `point` |")]
     assert len(rows) == 2  # one row for a contact, and one row for a relay
 
 
 def test_the_page_has_every_kind_driver_and_bus() -> None:
-    page = reference.page()
+    page = markdown()
     for bus in named.bus_types():
         assert f"## Bus of `type: {bus}`" in page
     for shape in json_schema.shapes():

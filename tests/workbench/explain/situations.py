@@ -279,13 +279,7 @@ def door_held_open_by_a_person() -> Case:
 def door_asked_once_stays_shut() -> Case:
     """A dashboard has asked the supervisor for the door once, before the listener began. The door stays
     shut."""
-    scene = Scene("ward")
-    scene.fail("ward", "operator", "stuck")
-    scene.says(topics.ADAPTER_DOOR_REQUESTS, _door("ward", d.DoorModeValue.MODE_OPEN))
-    scene.run(4.0)
-    scene.heard.clear()
-    scene.run(4.0)
-    return scene.heard, "door", "ward"
+    return _asked_before(Scene("ward"), topics.ADAPTER_DOOR_REQUESTS)
 
 
 def door_told_directly_stays_shut() -> Case:
@@ -293,12 +287,7 @@ def door_told_directly_stays_shut() -> Case:
     door stays shut."""
     scene = Scene("ward")
     scene.supervisors["door_supervisor"].kill()
-    scene.fail("ward", "operator", "stuck")
-    scene.says(topics.DOOR_REQUESTS, _door("ward", d.DoorModeValue.MODE_OPEN))
-    scene.run(4.0)
-    scene.heard.clear()
-    scene.run(4.0)
-    return scene.heard, "door", "ward"
+    return _asked_before(scene, topics.DOOR_REQUESTS)
 
 
 def door_let_go_is_kept_open() -> Case:
@@ -416,6 +405,16 @@ def _two(lift: str) -> tuple[Scene, Guest, Guest]:
     scene.run(2.0)
     blue.asks(lift, "L1")
     return scene, red, blue
+
+
+def _asked_before(scene: Scene, topic: topics.Topic[d.DoorRequest]) -> Case:
+    """Let the door stay shut after one OPEN on this topic, which came before the listener began."""
+    scene.fail("ward", "operator", "stuck")
+    scene.says(topic, _door("ward", d.DoorModeValue.MODE_OPEN))
+    scene.run(4.0)
+    scene.heard.clear()
+    scene.run(4.0)
+    return scene.heard, "door", "ward"
 
 
 def _door(door: str, mode: int) -> d.DoorRequest:

@@ -204,7 +204,7 @@ def test_a_remedy_counts_more_than_that_nobody_has_to_act() -> None:
     idle = Explanation("dispenser", "X", "", ("It is idle.",), (NextStep("nobody", "wait"),))
     trouble = Trouble("dispenser", "X", "OUTCOME_UNKNOWN", "warning", "dispenser X")
     remedies = {"OUTCOME_UNKNOWN": ("nobody knows", "look at the robot")}
-    text = worded(Notice("new", trouble, 30.0), idle, None, remedies, AT).text
+    text = worded(Notice("new", trouble, 30.0), idle, None, remedies, AT, "").text
     assert text.splitlines() == [
         "At 2026-11-29 02:13:05 the trouble had lasted 30 s.",
         "It is idle.",
