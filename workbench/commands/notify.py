@@ -127,6 +127,7 @@ def _acknowledge(given: Path | None, key: str) -> int:
         complain("notify", f"{SERVICE_STATE} is not readable for this user: {told}")
         return os.EX_NOPERM
     name = ACKNOWLEDGED + sha256(key.encode(errors="replace")).hexdigest()[:16]
+    os.umask(0o022)  # root writes this file, and the service's user reads it
     try:
         files.replace(state / name, key.encode(errors="replace"))
     except OSError as error:

@@ -1,7 +1,8 @@
 """Decide when people get a notice of a trouble. All functions are pure, because time is an argument.
 
-NOTIFY-1. A trouble gets one notice, after the trouble has lasted `after_s`. If a trouble goes away and
-comes back within `after_s`, it counts as present without a break. NOTIFY-2. The end of a trouble gets
+NOTIFY-1. A trouble gets one notice, after the trouble has lasted `after_s`, and another one when its
+stage rises. If a trouble goes away and comes back within `after_s`, it counts as present without a
+break. NOTIFY-2. The end of a trouble gets
 one notice, after the trouble has been gone for `over_s`. Only a trouble that people know from a notice
 gets this second notice. A trouble that comes back earlier is still the same trouble. If a device is not
 heard now, its trouble is not gone, because nothing is known about the device; then only its silence is
@@ -18,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from datetime import time
 from typing import Final, Literal
 
-from msgspec import Struct
+from msgspec import Struct, structs
 
 from workbench.notify.settings import NotifySettings
 from workbench.notify.troubles import SILENT, Trouble
@@ -40,17 +41,19 @@ class Notice:
 @dataclass(frozen=True, slots=True)
 class KnownTrouble:
     """A trouble that began at `since` and was last seen at `seen_at`. `told_at` is the time of the last
-    notice, or None if no notice was sent."""
+    notice, or None if no notice was sent. `told_stage` is the trouble's stage at that time."""
 
     trouble: Trouble
     since: float
     seen_at: float
     told_at: float | None = None
+    told_stage: int = 0
     acknowledged: bool = False
 
 
 class KeptTrouble(Struct, frozen=True):
-    """A trouble on disk that was already reported to people. `since` is the wall time (s)."""
+    """A trouble on disk that was already reported to people. Its stage is the one of the last notice.
+    `since` is the wall time (s)."""
 
     trouble: Trouble
     acknowledged: bool
@@ -75,7 +78,10 @@ class Notices:
         for trouble in present:
             before = self.known.get(trouble.key)
             if before is not None:
-                self.known[trouble.key] = replace(before, trouble=trouble, seen_at=now)
+                told_stage = min(before.told_stage, trouble.stage)
+                self.known[trouble.key] = replace(
+                    before, trouble=trouble, seen_at=now, told_stage=told_stage
+                )
             elif len(self.known) < MOST:
                 self.known[trouble.key] = KnownTrouble(trouble, now, now)
         unheard = set()
@@ -99,14 +105,22 @@ class Notices:
     def kept(self, ahead_s: float) -> list[KeptTrouble]:
         """Return the troubles already reported to people, for the next start. `ahead_s`: the wall time
         minus the time (s) of `turn`."""
-        told = (one for one in self.known.values() if one.told_at is not None)
-        return [KeptTrouble(o.trouble, o.acknowledged, round(o.since + ahead_s)) for o in told]
+        return [
+            KeptTrouble(
+                structs.replace(one.trouble, stage=one.told_stage),
+                one.acknowledged,
+                round(one.since + ahead_s),
+            )
+            for one in self.known.values()
+            if one.told_at is not None
+        ]
 
     def restore(self, kept: Iterable[KeptTrouble], now: float, ahead_s: float) -> None:
         """Begin with the troubles that an earlier run reported to people."""
         for one in kept:
             since = min(one.since - ahead_s, now)
-            known = KnownTrouble(one.trouble, since, now, now, one.acknowledged)
+            stage = one.trouble.stage
+            known = KnownTrouble(one.trouble, since, now, now, stage, one.acknowledged)
             self.known[one.trouble.key] = known
 
     def acknowledge(self, key: str) -> bool:
@@ -120,17 +134,21 @@ class Notices:
         one, s = self.known[key], self.settings
         if one.seen_at < now:
             return self._gone(key, now, clock)
-        lasts_s = now - one.since
+        lasts_s = one.trouble.before_s + now - one.since
         if lasts_s < s.after_s or self._is_quiet(one, clock):
             return None
-        if one.told_at is None:
+        acknowledged = one.acknowledged
+        if one.told_at is None or one.trouble.stage > one.told_stage:
             event: Event = "new"
+            acknowledged = False
         elif _repeats(one, s) and now - one.told_at >= s.again_s:
             event = "again"
         else:
             return None
-        self.known[key] = replace(one, told_at=now)
-        return Notice(event, one.trouble, one.trouble.before_s + lasts_s)
+        self.known[key] = replace(
+            one, told_at=now, told_stage=one.trouble.stage, acknowledged=acknowledged
+        )
+        return Notice(event, one.trouble, lasts_s)
 
     def _gone(self, key: str, now: float, clock: time) -> Notice | None:
         one, s = self.known[key], self.settings

@@ -1,10 +1,11 @@
 """The file of `rmf-bridge notify`: the recipients, and which notices each recipient gets.
 
-page: https://rmf.hospital.example      # optional: web page to which notices link quiet: {from:
-"22:00", to: "06:00"}     # optional: warnings wait until the end of this time to:
-- {ntfy: "https://ntfy.sh/our-topic", token_file: /etc/rmf-bridges/ntfy.token}
-- {webhook: "https://chat.example/hook", least: critical}
-- {mail: [lifts@hospital.example], from: rmf@hospital.example, host: mail.hospital.example}
+page: https://rmf.hospital.example       # optional: the web page to which notices link
+quiet: {from: "22:00", to: "06:00"}      # optional: warnings wait until the end of this time
+to:
+  - {ntfy: "https://ntfy.sh/our-topic", token_file: /etc/rmf-bridges/ntfy.token}
+  - {webhook: "https://chat.example/hook", least: critical}
+  - {mail: [lifts@hospital.example], from: rmf@hospital.example, host: mail.hospital.example}
 """
 
 from datetime import time
@@ -26,8 +27,8 @@ Url = Annotated[
     str,
     Meta(
         max_length=2048,
-        pattern=r"^https?://[!-~]+$(?!\n)",
-        extra={"pattern": "an address that begins with https:// or http://"},
+        pattern=r"^https?://[!-.0-~][!-~]*$(?!\n)",
+        extra={"pattern": "an address such as https://host.example/path"},
     ),
 ]
 Clock = Annotated[

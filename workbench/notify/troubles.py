@@ -29,7 +29,8 @@ def severity_of(code: str) -> Severity:
 
 class Trouble(Struct, frozen=True):
     """One trouble of one device. `what` is a code that stays the same as long as the trouble lasts.
-    `before_s` is the time (s) for which it has lasted before it counts as a trouble."""
+    `before_s` is the time (s) for which it has lasted before it counts as a trouble. `stage` rises when
+    the trouble gets worse."""
 
     kind: str
     device: str
@@ -37,6 +38,7 @@ class Trouble(Struct, frozen=True):
     severity: Severity
     headline: str
     before_s: float = 0.0
+    stage: int = 0
 
     @property
     def key(self) -> str:
@@ -71,21 +73,24 @@ def of_certificates(
 ) -> Iterator[Trouble]:
     """Yield the troubles of these certificates, each (daemon, key, file). `now` is the wall time (s).
 
-    A certificate whose validity ends within a week is a second trouble besides SOON. Thus people get a
-    second notice.
+    A certificate is a trouble a month before it expires. The trouble's stage rises a week before the
+    expiry and at the expiry, so people get a further notice each time.
     """
     for daemon, key, file in named:
         found = end(file)
-        for what, within_s in (("SOON", SOON_S), ("WEEK", URGENT_S)):
-            if found.at is None and what == "SOON":
-                what = "UNREADABLE"
-            elif found.at is None or found.at - now >= within_s:
-                continue
-            over = found.at is not None and found.at < now
-            severity: Severity = "critical" if over and what == "WEEK" else "warning"
-            headline = told(f"certificate {file} ({daemon}, {key})", found, now)
-            code = printable(f"CERTIFICATE_{what} {key} {file}")
-            yield Trouble("daemon", daemon, code, severity, printable(headline))
+        left_s = SOON_S if found.at is None else found.at - now
+        if found.at is not None and left_s >= SOON_S:
+            continue
+        stage = (left_s < URGENT_S) + (left_s < 0)
+        what = "UNREADABLE" if found.at is None else "EXPIRES"
+        yield Trouble(
+            "daemon",
+            daemon,
+            printable(f"CERTIFICATE_{what} {key} {file}"),
+            "critical" if left_s < 0 else "warning",
+            printable(told(f"certificate {file} ({daemon}, {key})", found, now)),
+            stage=stage,
+        )
 
 
 def of_daemons(

@@ -16,31 +16,30 @@ ENDS, GONE = "/e/lift.pem", "No such file or directory"
         (CertificateEnd(NOW + 31 * DAY_S), []),
         (
             CertificateEnd(NOW + 12.5 * DAY_S),
-            [("SOON", "warning", "ends in 12 days, on 2027-01-27")],
+            [("EXPIRES", "warning", 0, "ends in 12 days, on 2027-01-27")],
         ),
         (
             CertificateEnd(NOW + 6.5 * DAY_S),
-            [
-                ("SOON", "warning", "ends in 6 days, on 2027-01-21"),
-                ("WEEK", "warning", "ends in 6 days, on 2027-01-21"),
-            ],
+            [("EXPIRES", "warning", 1, "ends in 6 days, on 2027-01-21")],
         ),
         (
             CertificateEnd(NOW - 2.5 * DAY_S),
-            [
-                ("SOON", "warning", "ended 2 days ago, on 2027-01-12"),
-                ("WEEK", "critical", "ended 2 days ago, on 2027-01-12"),
-            ],
+            [("EXPIRES", "critical", 2, "ended 2 days ago, on 2027-01-12")],
         ),
-        (CertificateEnd(None, GONE), [("UNREADABLE", "warning", f"cannot be read: {GONE}")]),
+        (CertificateEnd(None, GONE), [("UNREADABLE", "warning", 0, f"cannot be read: {GONE}")]),
     ],
 )
-def test_an_end_is_told_a_month_and_a_week_before_it_and_is_critical_afterwards(
-    end: CertificateEnd, wanted: list[tuple[str, str, str]]
+def test_an_expiry_is_told_a_month_and_a_week_before_it_and_is_critical_afterwards(
+    end: CertificateEnd, wanted: list[tuple[str, str, int, str]]
 ) -> None:
     key = "rmf.zenoh.tls.certificate"
     found = of_certificates([("lift", key, ENDS)], lambda _: end, NOW)
-    assert [(one.what, one.severity, one.headline) for one in found] == [
-        (f"CERTIFICATE_{what} {key} {ENDS}", severity, f"certificate {ENDS} (lift, {key}) {text}")
-        for what, severity, text in wanted
+    assert [(one.what, one.severity, one.stage, one.headline) for one in found] == [
+        (
+            f"CERTIFICATE_{what} {key} {ENDS}",
+            severity,
+            stage,
+            f"certificate {ENDS} (lift, {key}) {text}",
+        )
+        for what, severity, stage, text in wanted
     ]

@@ -117,11 +117,7 @@ def test_what_a_recipient_has_not_taken_is_sent_after_a_restart(
     def taken() -> set[str]:
         return {json.loads(body)["key"] for _, body in sink.got}
 
-    wanted = {
-        f"daemon notify: CERTIFICATE_{what} certificates {one}"
-        for one in ended
-        for what in ("SOON", "WEEK")
-    }
+    wanted = {f"daemon notify: CERTIFICATE_EXPIRES certificates {one}" for one in ended}
     with notify(file, state, domain):
         wait_until(lambda: taken() == wanted, "each notice")
         for key in wanted:
@@ -133,3 +129,12 @@ def test_what_a_recipient_has_not_taken_is_sent_after_a_restart(
         str(one) for one in ended
     }
     assert all(one["acknowledged"] for one in told)
+
+
+def test_an_acknowledgement_is_readable_for_the_service_under_any_umask(tmp_path: Path) -> None:
+    file, state = tmp_path / "to.yaml", tmp_path / "state"
+    file.write_text(FILE.format(url="https://chat.example/hook"))
+    acknowledge = command("notify", file, "--state", state, "--ack", "door ward: SILENT")
+    assert subprocess.run(acknowledge, env=environment(), umask=0o077).returncode == os.EX_OK
+    [written] = state.iterdir()
+    assert written.stat().st_mode & 0o777 == 0o644

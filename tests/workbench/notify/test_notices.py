@@ -72,6 +72,24 @@ def test_a_critical_trouble_is_told_again_until_somebody_acknowledges_it() -> No
     assert desk.passes(4000, SILENT, FIRE).told[4:] == []
 
 
+def test_a_trouble_that_gets_worse_is_told_again_also_after_its_acknowledgement() -> None:
+    soon = Trouble("daemon", "lift", "CERTIFICATE", "warning", "it ends in 6 days", stage=1)
+    over = msgspec.structs.replace(soon, severity="critical", headline="it has ended", stage=2)
+    heard = {("daemon", "lift")}
+    desk = Desk().passes(100, soon, heard=heard)
+    assert desk.notices.acknowledge(soon.key)
+    restarted = Desk(now=desk.now)
+    restarted.notices.restore(desk.notices.kept(0), desk.now, 0)
+    for one in desk, restarted:
+        one.told.clear()
+        one.passes(1000, over, heard=heard).passes(100, heard=heard)
+        assert one.told == [
+            "110 new CERTIFICATE 100",
+            "1010 again CERTIFICATE 1000",
+            "1160 over CERTIFICATE 1090",
+        ]
+
+
 def test_in_the_quiet_hours_only_critical_troubles_are_told_and_warnings_afterwards() -> None:
     quiet = QuietHours(begins="22:00", ends="06:00")
     desk = Desk(Notices(msgspec.structs.replace(SETTINGS, quiet=quiet)), clock=NIGHT)
@@ -100,7 +118,7 @@ def test_what_a_silent_device_had_is_not_over_and_only_its_silence_is_told() -> 
     stuck = Trouble("lift", "Lift1", "STUCK", "critical", "Lift1 does not move", 180.0)
     dead = Trouble("lift", "Lift1", "SILENT", "critical", "lift Lift1 is silent")
     desk = Desk().passes(100, FIRE, stuck)
-    assert desk.told == ["40 new STUCK 210", "40 new FIRE 30"]
+    assert desk.told == ["10 new STUCK 180", "40 new FIRE 30"]
     desk.passes(2000, dead, heard=ALL - {("lift", "Lift1")})
     assert desk.told[2:] == [
         "140 new SILENT 30",
