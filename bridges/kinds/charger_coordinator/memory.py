@@ -111,6 +111,13 @@ class Wish(msgspec.Struct, frozen=True):
     request_id: str = ""
     start_timeout_s: float = 0.0
 
+    @property
+    def whose(self) -> str:
+        """The wish's origin in words. An operator's wish without a request was adopted from a station:
+        another node may have requested it, or nobody."""
+        adopted = self.by == "operator" and not self.request_id
+        return "by an adopted request" if adopted else WHOSE[self.by]
+
     @classmethod
     def of(cls, wanted: ChargeWanted) -> "Wish":
         """Make a wish from an operator's request."""

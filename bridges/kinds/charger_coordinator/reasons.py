@@ -13,7 +13,6 @@ from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.memory import (
     CHARGING,
     ERROR,
-    WHOSE,
     SiteLimits,
     SiteMemory,
 )
@@ -50,7 +49,7 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
             texts.append(f"{first} is free in {_lasts(wait_s)}")
         why = ", ".join(texts) or "the charging schedule has no station for this robot"
         why = why if memory.may_speak else memory.passive
-        yield f"{wish.robot} {WHOSE[wish.by]}: {why}"
+        yield f"{wish.robot} {wish.whose}: {why}"
 
 
 def free_in_s(memory: SiteMemory, station: str, now: float) -> float:

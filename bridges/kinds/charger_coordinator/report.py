@@ -25,7 +25,6 @@ from bridges.kinds.charger_coordinator.memory import (
     CHARGING,
     ERROR,
     NODE,
-    WHOSE,
     Grant,
     SiteLimits,
     SiteMemory,
@@ -93,7 +92,7 @@ def report(memory: SiteMemory, now: float, site: SiteLimits) -> SiteReport:
     waiting = queued(memory)
     return SiteReport(
         read_at=max((seen.at for seen in memory.stations.values()), default=None),
-        stations=tuple((name, _of(memory, name)) for name in site.places),
+        stations=tuple((name, _of(memory, name, now, site)) for name in site.places),
         queue=tuple(reasons(memory, now, site)),
         waiting=tuple(wish.robot for wish in waiting),
         assigns=_assigns(memory),
@@ -109,17 +108,27 @@ def _assigns(memory: SiteMemory) -> str:
     return "no: another node publishes charging_assignments"
 
 
-def _of(memory: SiteMemory, name: str) -> str:
+def _of(memory: SiteMemory, name: str, now: float, site: SiteLimits) -> str:
     """Describe a station: `CHARGING fleet/robot, by the schedule`, or `IDLE`. Before the first state
-    the text is `?`."""
+    the text is `?`. The state of a silent station is in the past: `was IDLE`."""
     seen, grant = memory.stations.get(name), memory.grants.get(name)
     state = "?" if seen is None else seen.state.name.removeprefix("CHARGER_")
+    if seen is not None and now >= memory.silent_since(name):
+        state = f"silent, was {state}"
     if grant is None or grant.over:
         return state
     wish = memory.wish(grant.robot)
-    whose = f", {WHOSE[wish.by]}" if wish else ""
-    told = ", told to leave another pad" if grant.robot in memory.nudges else ""
+    whose = f", {wish.whose}" if wish else ""
+    told = ", told to leave another pad" if _strayed(memory, name, grant, site) else ""
     return f"{state} {grant.robot}{whose}{told}"
+
+
+def _strayed(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> bool:
+    """Return whether the robot was told to leave the pad of another station, and still stands there."""
+    return grant.robot in memory.nudges and wrong_pad.stands(memory, grant.robot, site)[0] not in (
+        None,
+        name,
+    )
 
 
 def _faults(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[Fault]:

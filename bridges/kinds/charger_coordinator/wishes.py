@@ -78,7 +78,8 @@ def wanted(memory: SiteMemory, event: ChargeWanted, site: SiteLimits) -> tuple[S
     if event.request_id in memory.over:
         return memory, "request is over"
     if event.station and event.station not in site.robots[who]:
-        return memory, "station does not suit the robot"
+        known = event.station in site.places
+        return memory, "station does not suit the robot" if known else "unknown charger"
     wish, before = Wish.of(event), memory.wish(who)
     if wish == before:
         return memory, ""

@@ -97,6 +97,16 @@ def due(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
         yield _alarm_at(memory, one)
 
 
+def stands(memory: SiteMemory, who: RobotName, site: SiteLimits) -> tuple[str | None, float, float]:
+    """Return the station where the robot stands, the time of its arrival, and the time from which it
+    counts as standing there."""
+    for name, seen in memory.stations.items():
+        if seen.diagnosis is FaultCause.PAD and on_pad(seen.error, site) == who:
+            return name, seen.since, seen.since
+    came_at = memory.here_since(who)
+    return memory.stands_at(who, site), came_at, came_at + SETTLES_S
+
+
 # ---- helpers
 
 
@@ -106,22 +116,10 @@ def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWro
     for name, grant in memory.grants.items():
         if grant.over or grant.started:
             continue
-        at, came_at, settled_at = _stands(memory, grant.robot, site)
+        at, came_at, settled_at = stands(memory, grant.robot, site)
         since = settled_at if came_at > grant.made_at else grant.made_at + LEAVES_S
         if at is not None and at != name and since <= now:
             yield OnWrongPad(grant.robot, at, since, grant.request_id, TRIES, expected=name)
-
-
-def _stands(
-    memory: SiteMemory, who: RobotName, site: SiteLimits
-) -> tuple[str | None, float, float]:
-    """Return the station where the robot stands, the time of its arrival, and the time from which it
-    counts as standing there."""
-    for name, seen in memory.stations.items():
-        if seen.diagnosis is FaultCause.PAD and on_pad(seen.error, site) == who:
-            return name, seen.since, seen.since
-    came_at = memory.here_since(who)
-    return memory.stands_at(who, site), came_at, came_at + SETTLES_S
 
 
 def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:

@@ -15,6 +15,7 @@ from bridges.kinds.charger_coordinator.memory import (
     SiteMemory,
     Standing,
     StationSeen,
+    Wish,
 )
 from bridges.kinds.charger_coordinator.signals import (
     ChargerStateHeard,
@@ -104,13 +105,21 @@ def test_the_assignments_are_published_again_after_a_rival_has_gone() -> None:
     assert published(MaySpeak(True)) == ["charging_assignments"]
 
 
-def test_the_report_tells_which_robot_was_told_to_leave_another_pad() -> None:
+def test_the_report_tells_which_robot_was_told_to_leave_another_pad_until_it_has_left() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
     told = {ONE: Nudge(site_.memory.grants[A].request_id, 1, 1.0)}
-    shown = report.report(replace(site_.memory, nudges=told), site_.now, SITE)
-    assert shown.stations[0] == (A, "IDLE tiny/AMR01, by the robot, told to leave another pad")
+    for place, more in (("dock_b", ", told to leave another pad"), (None, ""), ("dock_a", "")):
+        there = {ONE: Standing(Sighting(ONE, True, place, 40.0, "task"), site_.now)}
+        memory = replace(site_.memory, nudges=told, robots=there)
+        shown = report.report(memory, site_.now, SITE)
+        assert shown.stations[0] == (A, f"IDLE tiny/AMR01, by the robot{more}"), place
+    adopted = replace(site_.memory, wishes=(Wish(ONE, "operator"),))
+    shown = report.report(adopted, site_.now, SITE)
+    assert shown.stations[0] == (A, "IDLE tiny/AMR01, by an adopted request")
+    late = report.report(adopted, site_.memory.silent_since(A), SITE)
+    assert late.stations[0] == (A, "silent, was IDLE tiny/AMR01, by an adopted request")
     unknown = report.report(replace(site_.memory, wishes=()), site_.now, SITE)
     assert unknown.stations[0] == (A, "IDLE tiny/AMR01")
 

@@ -64,6 +64,8 @@ def test_the_request_of_an_operator_counts_only_once() -> None:
     three = RobotName("tiny", "AMR03")
     unsuited = (before, "station does not suit the robot")
     assert wishes.wanted(before, ChargeWanted(three, A, "op-2", 0.0), SITE) == unsuited
+    unknown = (before, "unknown charger")
+    assert wishes.wanted(before, ChargeWanted(three, "lost", "op-2", 0.0), SITE) == unknown
 
 
 def test_a_newer_request_of_an_operator_takes_the_robot_from_another_station() -> None:
