@@ -4,14 +4,18 @@ The charger's story (a list of its events) also tells the requests and the refus
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 from bridges.kinds.charger import refusals
 from bridges.messages.stamps import in_seconds
 from bridges.observe.charger import NOBODY, ObservedCharger
 from bridges.observe.news import News
 from bridges.observe.requesters import Moment
-from workbench.explain.device import Device
+from workbench.explain.device import DAEMON_REFUSES, Device
 from workbench.explain.rows import label
+
+SAME_S: Final = 3.0
+"""The longest time (s) between the message of a refusal and the daemon's count of the same refusal."""
 
 
 @dataclass(slots=True)
@@ -52,6 +56,19 @@ class ChargerFacts(Device, ObservedCharger):
                 return f"{self.name} is {self.condition.value}{whose}{error}"
         return ""
 
+    def _reads(self, one: News) -> str:
+        """Return the story line for an event that all kinds of device have. A refusal that `refused`
+        has told gets no second line."""
+        told = self.refusal
+        if (
+            one.what == "refused"
+            and told is not None
+            and told.text.partition(": ")[0] == one.text
+            and one.at.at - told.at.at < SAME_S
+        ):
+            return ""
+        return super()._reads(one)
+
     def notice(self, one: News) -> None:
         """Count the charges that begin."""
         began = one.what == "changed" and self.changed.keys() != {"request"}
@@ -62,5 +79,11 @@ class ChargerFacts(Device, ObservedCharger):
         who, text = label(refusal.robot), label(refusal.text, 300)
         last = self.refusal
         if last is None or (last.request, last.text) != (label(refusal.request_id), text):
+            self._untell(moment, DAEMON_REFUSES + text.partition(": ")[0])
             self.tell(moment, f"{self.name} refuses {who}: {text}")
         self.refusal = HeardRefusal(who, label(refusal.request_id), text, moment)
+
+    def _untell(self, moment: Moment, text: str) -> None:
+        """Take the story's last line back, if it has this text and is as new as SAME_S."""
+        if self.lines and self.lines[-1].text == text and moment.at - self.lines[-1].at < SAME_S:
+            self.lines.pop()

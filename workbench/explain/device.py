@@ -19,6 +19,7 @@ from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
 
 MOST_LINES: Final = 600
+DAEMON_REFUSES: Final = "its daemon refuses a request: "
 LONGEST_DETAIL: Final = 300
 """Maximum length (characters) of a fault's detail. The details of HTTP drivers contain an address and a
 reason."""
@@ -92,7 +93,7 @@ class Device(ObservedDevice[Any]):
             case "read":
                 return "the readings are fresh again"
             case "refused":
-                return f"its daemon refuses a request: {one.text}"
+                return DAEMON_REFUSES + one.text
             case "fault" | "fault over":
                 return self._fault(one)
         return ""
