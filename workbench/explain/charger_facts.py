@@ -8,7 +8,7 @@ from typing import Final
 
 from bridges.kinds.charger import refusals
 from bridges.messages.stamps import in_seconds
-from bridges.observe.charger import NOBODY, ObservedCharger
+from bridges.observe.charger import CHARGING, NOBODY, ObservedCharger
 from bridges.observe.news import News
 from bridges.observe.requesters import Moment
 from workbench.explain.device import DAEMON_REFUSES, Device
@@ -36,6 +36,7 @@ class ChargerFacts(Device, ObservedCharger):
         super().__init__(name, began)
         self.refusal: HeardRefusal | None = None
         self.charges = 0
+        self._counted = ""
 
     @property
     def full_in_s(self) -> float:
@@ -70,9 +71,12 @@ class ChargerFacts(Device, ObservedCharger):
         return super()._reads(one)
 
     def notice(self, one: News) -> None:
-        """Count the charges that begin."""
+        """Count the charges that begin. A charge that goes on after a pause is not counted again."""
         began = one.what == "changed" and self.changed.keys() != {"request"}
-        self.charges += began and self.condition.value == "charging"
+        if began and self.condition.value == CHARGING:
+            request = self.request.value
+            self.charges += not request or request != self._counted
+            self._counted = request
 
     def refused(self, moment: Moment, refusal: refusals.ChargerRefusal) -> None:
         """Remember a refused request and its reason."""

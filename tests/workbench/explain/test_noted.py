@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from bridges.kinds.charger.refusals import refused
-from bridges.kinds.charger.settings import RobotName
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard, Own
 from bridges.runtime.diagnostics import diagnosis
@@ -124,19 +122,3 @@ def test_a_note_of_very_many_values_is_bounded() -> None:
     assert note is not None
     assert note.outputs is not None
     assert len(note.outputs) == MOST
-
-
-@pytest.mark.parametrize("note_first", [True, False])
-def test_a_refusal_that_is_noted_and_published_is_told_once(note_first: bool) -> None:
-    site = HeardDevices("bay1")
-    site.take(Heard(0.0, 0.0, "charger_states", d.ChargerState(charger_name="bay1")))
-    reason = "charger occupied"
-    noted = Own(
-        9.0, 9.0, "rmf_bridge/decisions", json.dumps({"subject": "bay1", "refused": reason})
-    )
-    answer = refused("r2", "bay1", RobotName("fleet", "blue"), reason)
-    published = Heard(9.1, 9.1, "charger_refusals", answer.message())
-    for one in (noted, published) if note_first else (published, noted):
-        site.take(one)
-    told = [line.text for line in site.explain("charger", "bay1", None).story]
-    assert [one for one in told if "refuse" in one] == ["bay1 refuses fleet/blue: charger occupied"]
