@@ -111,8 +111,9 @@ class OthersHeard:
         return listed(nodes[:MOST_NAMES]) if nodes else ""
 
 
-def unheard(device: Device, around: OthersHeard) -> Answer:
-    """Answer for a device whose states were never heard."""
+def unheard(device: Device, around: OthersHeard, lists: str = "") -> Answer:
+    """Answer for a device whose states were never heard. `lists`: the node that lists the device, so
+    its name is not misspelt; "" if none does."""
     answer = Answer(since=device.began.at, because=SILENCES)
     others = (*around.names.get(device.kind, ()), *around.names.get("robot", ()))
     if not around.messages:
@@ -124,6 +125,13 @@ def unheard(device: Device, around: OthersHeard) -> Answer:
             f"Nothing at all was heard{seen if nodes else ''}.",
             "a person",
             "look at the domain, the network and the transport: `rmf-bridge doctor FILE`",
+        )
+    if lists:
+        return answer.say(
+            f"Nobody publishes a state of {device.name}, which {lists} lists: its daemon is not running"
+            " or is cut off.",
+            "a person",
+            f"start the daemon of {device.name}",
         )
     near = get_close_matches(device.name.lower(), {n.lower(): n for n in others}, 1)
     mean = next((f" (did you mean {name}?)" for name in others if [name.lower()] == near), "")

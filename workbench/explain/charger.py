@@ -41,7 +41,8 @@ def answer(
     also `queue`, `schedule` and `assigns`.
     """
     if charger.last_state is None:
-        found = common.unheard(charger, around)
+        lists = coordinator is not None and charger.id in coordinator.values
+        found = common.unheard(charger, around, "the coordinator" if lists else "")
         _refusal(found, charger, clock)
         return found
     stopped = common.stopped(charger, around, clock)

@@ -349,6 +349,12 @@ def coordinator_queues() -> Case:
     return scene.heard, "charger", "bay1"
 
 
+def charger_is_listed_but_silent() -> Case:
+    """No daemon serves a charger, but the coordinator lists it. Its name is like another's."""
+    heard, kind, _ = coordinator_queues()
+    return heard, kind, "bay2"
+
+
 SCENES: Final[Mapping[str, Callable[[], Case]]] = {
     made.__name__: made
     for made in (
@@ -384,6 +390,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         charger_refuses,
         wrong_station,
         coordinator_queues,
+        charger_is_listed_but_silent,
     )
 }
 
