@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--live",
         metavar="DEVICE",
-        help="listen to the graph instead of a FILE; DEVICE may be a robot of our fleet's daemon",
+        help="listen to the graph instead of a FILE; DEVICE may be a robot: FLEET/ROBOT",
     )
     parser.add_argument(
         "--for",
@@ -150,7 +150,7 @@ def _one(site: HeardDevices, args: argparse.Namespace) -> int:
         return 2
     found = _explained(site, args.kind, name)
     _tell(found, as_json=args.json)
-    return 0 if site.robot(name) or (found.kind, name) in site.devices() else 1
+    return 0 if found.kind == "robot" or (found.kind, name) in site.devices() else 1
 
 
 def _explained(site: HeardDevices, given: Explained | None, name: str) -> Explanation:

@@ -135,6 +135,13 @@ def unheard(device: Device, around: OthersHeard, lists: str = "") -> Answer:
         )
     near = get_close_matches(device.name.lower(), {n.lower(): n for n in others}, 1)
     mean = next((f" (did you mean {name}?)" for name in others if [name.lower()] == near), "")
+    if "/" in device.name:
+        return answer.say(
+            f"Nothing was heard of a robot {device.name}: no request, no lift or charger that it has,"
+            f" and no place in a queue; {_others(around)}.",
+            "a person",
+            f"look at its fleet adapter, or correct the spelling of its name{mean}",
+        )
     return answer.say(
         f"Nobody publishes a state of {device.name}: its daemon is not running or is cut off, or the"
         f" name is misspelt; {_others(around)}.",

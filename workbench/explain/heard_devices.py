@@ -5,7 +5,7 @@ day takes no more memory than a recording of a minute.
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from datetime import tzinfo
@@ -140,12 +140,30 @@ class HeardDevices(ObservedGraph[Device]):
         stated = [kind for kind in found if self.known[kind, name].state is not None]  # type: ignore[index]
         if self.robot(name):
             stated.append("robot")
-        return stated or found or (["charger"] if self._lists(name) else [])
+        listed: list[Explained] = ["charger"] if self._lists(name) else []
+        return stated or found or listed or (["robot"] if self.asking(name) else [])
 
     def robot(self, name: str) -> ObservedRobot | None:
         """Return the robot of this name, FLEET/ROBOT or ROBOT alone."""
         every = (one for one in robots(self.nodes) if name in (one.who, one.who.rpartition("/")[2]))
         return next(every, None)
+
+    def asking(self, name: str) -> str:
+        """Find a robot (FLEET/ROBOT, or ROBOT alone) by its requests, by the lift or charger that it
+        has, or by the coordinator's queue. Return FLEET/ROBOT, or "" if there is no such robot."""
+        return next((w for w in self._askers() if name in (w, w.rpartition("/")[2])), "")
+
+    def _askers(self) -> Iterator[str]:
+        """Yield the robots that `asking` finds."""
+        every = (*self.spoke, *(_holder(one) for one in self.stated()), *self._queue())
+        return (who for who in every if all(who.rpartition("/")[::2]))
+
+    def _queue(self) -> dict[str, str]:
+        """Return robot -> the origin of its wish and the reason why it waits, by the coordinator."""
+        coordinator = self._coordinator()
+        told = coordinator.value("queue").split("; ") if coordinator else []
+        parts = (text.partition(" by ") for text in told)
+        return {who: f"{by}{rest}".strip() for who, by, rest in parts if by}
 
     def explain(
         self, kind: Explained, name: str, zone: tzinfo | None, remedies: Remedies | None = None
@@ -155,13 +173,23 @@ class HeardDevices(ObservedGraph[Device]):
         if kind != "robot":
             return self._explain(kind, name, zone, remedies)
         one = self.robot(name)
-        assert one is not None
-        clock, wanted = TimePhrases(self.now, zone), dict[str, Explanation]()
-        for device, wait in waits(self.stated(), one.who, self.now):
-            wish = f"{device.kind} {device.name} ({label(wait.wants)}) {clock.since(wait.since)}"
-            wanted[wish] = self._explain(device.kind, device.id, zone, remedies)
-        began = self.began or self.now
-        return robot.explanation(one, wanted, clock, remedies or {}, began)
+        who = one.who if one else self.asking(name)
+        assert who
+        clock, concerns = TimePhrases(self.now, zone), dict[str, Device]()
+        for device, wait in waits(self.stated(), who, self.now):
+            since = clock.since(wait.since)
+            concerns[f"waits for {device.kind} {device.name} ({label(wait.wants)}) {since}"] = (
+                device
+            )
+        if one is None:
+            has = (d for d in self.stated() if _holder(d) == who and d not in concerns.values())
+            concerns |= {f"has {device.kind} {device.name}": device for device in has}
+        told = {
+            does: self._explain(device.kind, device.id, zone, remedies)
+            for does, device in concerns.items()
+        }
+        began, queued = self.began or self.now, self._queue().get(who, "")
+        return robot.explanation(who, one, told, queued, clock, remedies or {}, began)
 
     def _explain(
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None
@@ -227,7 +255,8 @@ class HeardDevices(ObservedGraph[Device]):
             kind: (*self._others[kind], *(label(one.id) for one in self.stated(kind)))
             for kind in KINDS
         }
-        names["robot"] = tuple(one.who for one in robots(self.nodes))
+        reported = (one.who for one in robots(self.nodes))
+        names["robot"] = tuple(dict.fromkeys((*reported, *map(label, self._askers()))))
         return common.OthersHeard(names, self.messages, spoke, remedies, reason, self.senders)
 
     def _answer(self, device: Device, clock: TimePhrases, around: common.OthersHeard) -> Answer:
@@ -310,6 +339,16 @@ class HeardDevices(ObservedGraph[Device]):
             f"At {clock.time(moment.wall)} the listener's clock was stepped by {by_s:+.0f} s."
             for moment, by_s in self.steps
         )
+
+
+def _holder(device: Device) -> str:
+    """Return the session that has the lift, or the robot that has the charger; "" for other devices."""
+    match device:
+        case LiftFacts():
+            return device.session.value
+        case ChargerFacts():
+            return device.robot.value
+    return ""
 
 
 def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:

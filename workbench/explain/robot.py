@@ -1,8 +1,9 @@
-"""Explain a robot of our fleet's daemon: why it stands, and who must act next.
+"""Explain a robot: why it stands, and who must act next.
 
-The robot's daemon reports its place, its command and its faults on `/diagnostics`. The states of lifts,
-doors and chargers show what the robot waits for. The explanation of such a device says why it does not
-serve the robot.
+The states of lifts, doors and chargers show what any robot waits for. The explanation of such a device
+says why it does not serve the robot. The charger coordinator's queue tells what a robot waits for that
+has no charger yet. Our fleet's daemon also reports each robot's place, command and faults on
+`/diagnostics`.
 """
 
 from collections.abc import Mapping
@@ -41,37 +42,74 @@ LETS: Final[Mapping[str, str]] = {
     "error": "has an error: the robot has gone to a place for which it had no permission",
 }
 
+OF_OTHERS: Final = (
+    "No daemon of rmf-bridges reports on this robot, so its place, its task and its faults are not"
+    " known."
+)
+
 
 def explanation(
-    robot: ObservedRobot,
-    waits: Mapping[str, Explanation],
+    who: str,
+    robot: ObservedRobot | None,
+    devices: Mapping[str, Explanation],
+    queued: str,
     clock: TimePhrases,
     remedies: Remedies,
     began: Moment,
 ) -> Explanation:
-    """Explain the robot. `waits` maps each thing that the robot waits for, in words, to the explanation
-    of that lift, door or charger."""
-    said = robot.said
-    found = _answer(robot, waits, clock, remedies)
-    faults = (
-        FaultTold(code, detail, clock.since(moment), *remedies.get(code, ()))
-        for code, (detail, moment) in said.faults.items()
-    )
+    """Explain the robot `who` (FLEET/ROBOT).
+
+    - `robot`: the report of our fleet's daemon; None for a robot of another node's fleet.
+    - `devices`: each device that the robot waits for or has, in words such as `waits for lift Lift1`
+      -> the device's explanation.
+    - `queued`: the origin of the robot's wish and the reason why it gets no charger, from the
+      coordinator's queue; "" if the robot is not in the queue.
+    """
     heard_s = lasted(clock.now.at - began.at)
+    told: tuple[FaultTold, ...] = ()
+    before = ""
+    if robot is None:
+        found = _of_others(label(who), devices, queued)
+    else:
+        found, said = _answer(robot, devices, queued, clock, remedies), robot.said
+        told = tuple(
+            FaultTold(code, detail, clock.since(moment), *remedies.get(code, ()))
+            for code, (detail, moment) in said.faults.items()
+        )
+        before = (
+            f"Its daemon's report: at {said.value('at')}, doing {said.value('doing') or 'nothing'},"
+            f" battery {said.value('battery') or 'unknown'}, new tasks {said.value('new_tasks')}."
+        )
     return Explanation(
         kind="robot",
-        device=label(robot.who),
+        device=label(who),
         heard=f"{clock.date(began.wall)} to {clock.time(clock.now.wall)} ({heard_s})",
         now=tuple(found.now),
         next=tuple(dict.fromkeys(found.next)),
-        faults=tuple(faults),
-        before=f"Its daemon's report: at {said.value('at')}, doing {said.value('doing') or 'nothing'},"
-        f" battery {said.value('battery') or 'unknown'}, new tasks {said.value('new_tasks')}.",
+        faults=told,
+        notes=found.notes,
+        before=before,
+    )
+
+
+def _of_others(who: str, devices: Mapping[str, Explanation], queued: str) -> Answer:
+    """Explain a robot on which no daemon of ours reports."""
+    found = Answer(notes=(OF_OTHERS,))
+    if devices or queued:
+        return _served(found, who, devices, queued)
+    return found.say(
+        f"{who} waits for no lift, door or charger that was heard, and has none.",
+        "a person",
+        "look at the robot's own fleet adapter and at RMF's tasks",
     )
 
 
 def _answer(
-    robot: ObservedRobot, waits: Mapping[str, Explanation], clock: TimePhrases, remedies: Remedies
+    robot: ObservedRobot,
+    devices: Mapping[str, Explanation],
+    queued: str,
+    clock: TimePhrases,
+    remedies: Remedies,
 ) -> Answer:
     who, said, found = label(robot.who), robot.said, Answer()
     if not said.is_current(clock.now.at):
@@ -86,15 +124,24 @@ def _answer(
         detail = said.faults[code][0].rstrip(".")
         do = remedies.get(code, ("", f"mend {code}"))[1]
         found.say(f"{who} {STANDS[code]}: {detail}.", "a person", do)
-    for wish, device in waits.items():
-        if who not in device.now[0]:
-            found.say(f"{who} waits for {wish}.")
-        found.now += device.now
-        found.next += device.next
+    _served(found, who, devices, queued)
     if robot.daemon and "RMF_NOT_JOINED" in robot.daemon.faults:
         detail, _ = robot.daemon.faults["RMF_NOT_JOINED"]
         found.say(f"No RMF directs {who}: {detail}.", "a person", "start RMF's schedule node")
     return found if found.now else _mission(found, who, said.value("doing"))
+
+
+def _served(found: Answer, who: str, devices: Mapping[str, Explanation], queued: str) -> Answer:
+    """Explain what the robot waits for, and what it has."""
+    for does, device in devices.items():
+        if who not in device.now[0]:
+            found.say(f"{who} {does}.")
+        found.now += device.now
+        found.next += device.next
+    if queued:
+        text = f"{who} waits in the coordinator's queue, {label(queued, 300)}."
+        found.say(text, "the coordinator", "give it a charger that suits it and is free")
+    return found
 
 
 def _mission(found: Answer, who: str, doing: str) -> Answer:

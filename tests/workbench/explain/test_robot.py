@@ -11,6 +11,7 @@ from bridges.messages.stamps import stamp
 from bridges.runtime.diagnostics import diagnosis
 from workbench.explain.explanation import Explanation, NextStep
 from workbench.explain.heard_devices import HeardDevices
+from workbench.explain.robot import OF_OTHERS
 from workbench.graph.board import Board, BoardRow
 
 REMEDIES = {
@@ -162,3 +163,55 @@ def test_a_robots_assigned_place_joins_its_row() -> None:
         ("tiny/AMR01", "charge at pad_a", "at L1 pantry, nothing, 80 %"),
         ("big/B1", "-", "wait at pad_b"),
     ]
+
+
+# ---- robots of another node's fleet
+
+
+def coordinated(at: float, queue: str) -> Heard:
+    """Return the coordinator's report with this queue."""
+    site = {"queue": queue, "faults": [], "input_age_s": 0.2}
+    message = diagnosis("coordinator", "charger_coordinator", {}, {"site": site}, stamp(at))
+    return Heard(at, 1_700_000_000.0 + at, "/diagnostics", message)
+
+
+def of_others(name: str, *heard: Heard) -> Explanation:
+    site = HeardDevices()
+    for one in heard:
+        site.take(one)
+    assert site.kinds(name) == ["robot"]
+    return site.explain("robot", name, None, REMEDIES)
+
+
+def test_a_robot_of_another_fleet_is_explained_by_the_lift_that_it_waits_for_or_has() -> None:
+    heard = [one for at in range(9) for one in lift(float(at))]
+    told = of_others("AMR01", *heard)
+    assert told.device == "tiny/AMR01"
+    assert told.now[0].startswith("tiny/AMR01 has waited since before 22:13:20")
+    assert any("tiny/AMR02" in text for text in told.now)
+    assert told.notes == (OF_OTHERS,)
+    assert "tiny/AMR02" in of_others("tiny/AMR02", *heard).now[0]
+    opens = d.DoorRequest(stamp(0.0), "tiny/AMR04", "ward", d.DoorMode(2))
+    told = of_others("AMR04", Heard(0.0, 1_700_000_000.0, "/adapter_door_requests", opens))
+    assert told.now == (
+        "tiny/AMR04 waits for no lift, door or charger that was heard, and has none.",
+    )
+    assert [step.who for step in told.next] == ["a person"]
+
+
+def test_a_robot_in_the_coordinators_queue_is_explained_by_the_reason_in_the_queue() -> None:
+    queue = "tiny/AMR03 by the robot: charger_a charges tiny/AMR01; porter/P 1 by the schedule: x"
+    told = of_others("AMR03", coordinated(9.0, queue))
+    assert told.now == (
+        "tiny/AMR03 waits in the coordinator's queue, by the robot: charger_a charges tiny/AMR01.",
+    )
+    assert told.next == (
+        NextStep("the coordinator", "give it a charger that suits it and is free"),
+    )
+    assert of_others("porter/P 1", coordinated(9.0, queue)).device == "porter/P 1"
+    ours = explained(
+        reported(9.0), coordinated(9.5, "tiny/AMR01 by the robot: charger_a is silent")
+    )
+    assert ours.now == (
+        "tiny/AMR01 waits in the coordinator's queue, by the robot: charger_a is silent.",
+    )
