@@ -12,7 +12,13 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.charger import pad
-from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory, rivalled, unreachable
+from bridges.kinds.charger.memory import (
+    ChargerLimits,
+    ChargerMemory,
+    ChargeSession,
+    rivalled,
+    unreachable,
+)
 from bridges.kinds.charger.session import cleared_to_start
 from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger.signals import CURRENT_FLOWS, Activity, ChargerSample, Measured
@@ -38,6 +44,8 @@ LOST = {
 """Fault codes of stations that cannot be reached or commanded, with the fixed error messages for RMF.
 The text of such an error is only in the fault's detail."""
 OUT_OF_SERVICE = "out of service after: "
+STOPS_WITHIN_S: Final = 3.0
+"""The time (s) that a station may need to stop after an order. A longer charge is a fault."""
 
 STATION_NEXT: Final = "for the station to charge"
 """The beginning of the reason for a robot that only the station keeps waiting."""
@@ -127,7 +135,7 @@ def report(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerR
         fleet=who.fleet if who else "",
         robot=who.name if who else "",
         verified=who is not None and on_pad.robot == who,
-        faults=(*found, *_irregular(memory, shown, limits)),
+        faults=(*found, *_irregular(memory, shown, now, limits)),
         measured=Measured() if lost or memory.sample is None else memory.sample.measured,
         waits=_waits(memory, shown, limits),
     )
@@ -139,8 +147,10 @@ def _waits(memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimit
     if not holder or not sample or shown not in (ASSIGNED, CHARGING):
         return ""
     who, not_ready = holder.request.who, pad.not_ready(sample)
+    if shown is CHARGING and holder.over:
+        return f"for the station to stop: {_over(holder)}"
     if shown is CHARGING:
-        return f"because {not_ready}" if not_ready and not holder.over else ""
+        return f"because {not_ready}" if not_ready else ""
     if holder.over:
         return "for the end of the charger's handshake: the charger was at fault before"
     if not pad.seen(sample, limits).may_be(who):
@@ -149,6 +159,11 @@ def _waits(memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimit
         return f"because {not_ready}"
     ready = holder.started or cleared_to_start(memory, limits)
     return f"{STATION_NEXT} {who}" if ready else f"for {who} in range"
+
+
+def _over(holder: ChargeSession) -> str:
+    """Return why the request is over."""
+    return holder.ended or "the charger was at fault"
 
 
 def state(memory: ChargerMemory) -> ChargerStateValue:
@@ -196,7 +211,7 @@ def error_text(sample: ChargerSample) -> str:
 
 
 def _irregular(
-    memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits
+    memory: ChargerMemory, shown: ChargerStateValue, now: float, limits: ChargerLimits
 ) -> list[Fault]:
     """List faults that do not make the state ERROR."""
     holder = memory.holder
@@ -204,11 +219,12 @@ def _irregular(
         who = pad.seen(memory.sample, limits).robot or "the robot is not known"
         fault = Fault("UNREQUESTED_CHARGING", f"nobody requested it: {who}")
         return [fault] if shown is CHARGING else []
+    since = memory.disobeyed_since
+    still = since is not None and now - since >= STOPS_WITHIN_S
     stopping = memory.sample and memory.sample.activity is Activity.STOPPING
-    if shown is CHARGING and not stopping and holder.over and holder.ended != "full":
-        what = holder.ended or "the charger was at fault"
+    if shown is CHARGING and still and not stopping and holder.over and holder.ended != "full":
         whose = holder.request.request_id or holder.request.who
-        return [Fault("STILL_CHARGING", f"{whose}: {what}")]
+        return [Fault("STILL_CHARGING", f"{whose}: {_over(holder)}")]
     if shown is RELEASED and holder.ended == "start timeout":
         late = f"{holder.request.who} did not start to charge in time"
         why = pad.not_ready(memory.sample) if memory.sample else ""

@@ -244,7 +244,13 @@ def test_a_cancel_during_a_charge_ends_the_power_and_shows_charging_until_the_cu
         (8.0, "RELEASED", "req-1"),
         (10.0, "IDLE", ""),
     ]
-    assert story.faults == ["STILL_CHARGING: req-1: cancelled"]
+    assert story.faults == []
+
+
+def test_a_station_that_goes_on_charging_for_three_seconds_after_a_cancel_is_a_fault() -> None:
+    story = Story().polls("idle 1").event(AMR1).polls("charging 2").event(CANCEL_1)
+    assert story.polls("charging 3").faults == []
+    assert story.polls("charging 1").faults == ["STILL_CHARGING: req-1: cancelled"]
 
 
 def test_a_cancel_during_the_restart_delay_only_keeps_the_power_off() -> None:
@@ -347,7 +353,7 @@ def test_a_ramp_down_after_an_error_is_not_another_fault() -> None:
 
 
 def test_after_an_error_only_a_new_request_gives_power() -> None:
-    story = Story().polls("idle 1").event(AMR1).polls("hot 1, handshake 2, charging 1")
+    story = Story().polls("idle 1").event(AMR1).polls("hot 1, handshake 2, charging 4")
     assert story.told[2:] == [
         (1.0, "ERROR", "over temperature"),
         (2.0, "ASSIGNED", "req-1"),

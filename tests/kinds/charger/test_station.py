@@ -192,8 +192,8 @@ def test_a_station_at_fault_or_a_stranger_is_not_served_without_a_request() -> N
 
 def test_a_robot_served_without_a_request_gets_no_more_power_after_it_has_left() -> None:
     it = story(SERVING).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1), (A.IDLE, NOBODY, 1))
-    it.sees((A.CHARGING, ONE, 1))
-    assert it.powered == [False, True, True, False, False]
+    it.sees((A.CHARGING, ONE, 4))
+    assert it.powered == [False, True, True, *[False] * 5]
     assert still_charging(it) == ["STILL_CHARGING: tiny/AMR01: left"]
 
 
@@ -315,8 +315,8 @@ def test_a_displaced_robot_gets_no_more_power_for_its_request() -> None:
     it = (
         story().event(AMR1).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1), (A.HANDSHAKE, TWO, 1))
     )
-    it.sees((A.CHARGING, ONE, 2))
-    assert it.powered == [False, True, True, False, False, False]
+    it.sees((A.CHARGING, ONE, 4))
+    assert it.powered == [False, True, True, *[False] * 5]
     assert still_charging(it) == ["STILL_CHARGING: req-1: left"]
 
 
