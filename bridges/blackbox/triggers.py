@@ -2,7 +2,8 @@
 reasons are:
 
 - A fault appears. A hazard is a fault too, because it takes the device away from RMF.
-- The daemon refuses a request. Refusals at a normal handover or at a start do not count.
+- The daemon refuses a request. Refusals at a normal handover or at a start do not count. The refusal
+  of an operator's reset does not count either, because the command tells the operator why.
 - A request has waited longer than `waiting_s`.
 - The daemon reports that a defect in its program ends it.
 
@@ -22,8 +23,8 @@ from bridges.blackbox.entries import (
     SubjectForgotten,
 )
 from bridges.blackbox.incident import Note
-from bridges.blackbox.value_codec import Tree
-from bridges.kinds.shared.decision import EXPECTED
+from bridges.blackbox.value_codec import Tree, tree
+from bridges.kinds.shared.decision import EXPECTED, OperatorReset
 from bridges.kinds.shared.durations import AGES_AGO
 from bridges.messages import cdr
 from bridges.messages.heard import Heard
@@ -34,6 +35,7 @@ from bridges.observe.tally import SiteTally
 
 AGAIN_S: Final = 600.0
 MOST_NOTED: Final = 1000
+RESET: Final = tree(OperatorReset())
 
 FAULT, REFUSED, WAITING, DIED, OPERATOR = "FAULT", "REFUSED", "WAITING", "DIED", "OPERATOR"
 
@@ -92,7 +94,8 @@ class Triggers:
                         step.at, FAULT, f"{code}: {detail}" if detail else code, step.subject
                     )
             self._faults[step.subject] = set(codes)
-        if step.refused and step.refused.partition(": ")[0] not in EXPECTED:
+        expected = step.refused.partition(": ")[0] in EXPECTED or step.event == RESET
+        if step.refused and not expected:
             yield Note(step.at, REFUSED, step.refused, step.subject)
 
     def _spoken(self, spoken: Spoken) -> Iterator[Note]:

@@ -16,7 +16,7 @@ from bridges.blackbox.recordings import Named, Recordings, Stored, least_valuabl
 from bridges.blackbox.ring import DIED, Ring, RingContent
 from bridges.kinds.lift.report import LiftReport
 from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftRequested, LiftSample
-from bridges.kinds.shared.decision import Decision, Fault, IoFailed, Sampled
+from bridges.kinds.shared.decision import Decision, Fault, IoFailed, OperatorReset, Sampled
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages.definitions import (
@@ -148,9 +148,10 @@ def test_a_fault_makes_one_file_with_what_went_before_and_what_followed(machine:
         (lambda m: m.decide(LiftRequested("r2", True, "L3"), "busy: r1 rides"), "REFUSED"),
         (lambda m: m.decide(IoFailed("no answer"), "", Fault("INPUTS_NOT_FRESH")), "FAULT"),
         (lambda m: m.decide(SAMPLE, "released a moment ago"), None),
+        (lambda m: m.decide(OperatorReset(), "no error to clear"), None),
         (lambda m: m.decide(IoFailed("no answer")), None),
     ],
-    ids=["refused", "fault", "handover", "one failed reading"],
+    ids=["refused", "fault", "handover", "needless reset", "one failed reading"],
 )
 def test_refusals_and_faults_are_reasons_for_a_recording_and_handovers_are_not(
     machine: Machine, happens: Callable[[Machine], None], why: str | None
