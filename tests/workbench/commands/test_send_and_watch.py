@@ -151,6 +151,19 @@ def test_a_refused_request_for_a_charger_ends_with_who_has_it(
     )
 
 
+def test_a_door_that_records_the_fleets_requests_is_no_supervisor(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    device = Device(topics.DOOR_STATES, topics.DOOR_REQUESTS, DOOR)
+    recorded: list[Any] = []
+    MemoryTransport(device.network, "ward").subscribe(
+        topics.ADAPTER_DOOR_REQUESTS, recorded.append, others_only=True
+    )
+    assert send.send(Command(device), DoorMove("ward", True, ME), 0.5, io.StringIO()) == 1
+    assert "no door supervisor runs in this domain" in capsys.readouterr().err
+    assert recorded == []
+
+
 def test_send_and_watch_use_the_topic_names_of_the_sites_yaml() -> None:
     network = MemoryNetwork()
     singular = {"charger_states": "charger_state", "charger_requests": "charger_request"}

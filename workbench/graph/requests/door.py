@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from bridges.messages import definitions as d
 from bridges.messages import topics
+from bridges.messages.topics import AnyTopic
 from workbench.graph.requests import Fulfilled, Obstacle, Request, RequestProgress
 
 
@@ -24,6 +25,12 @@ class DoorMove(Request):
     states, own = topics.DOOR_STATES, topics.DOOR_REQUESTS
     adapter = topics.ADAPTER_DOOR_REQUESTS
     answers = (topics.DOOR_SUPERVISOR_HEARTBEAT,)
+
+    @property
+    def supervisor(self) -> AnyTopic | None:
+        """The heartbeat, which only supervisors publish. A door's daemon may subscribe to the fleet
+        adapters' topic too, for its recordings."""
+        return None if self.direct else topics.DOOR_SUPERVISOR_HEARTBEAT
 
     @property
     def mode(self) -> d.DoorModeValue:
