@@ -21,7 +21,7 @@ import tarfile
 import time
 import zlib
 from collections.abc import Iterable, Iterator
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Final
 
 from bridges.commands import enable
@@ -35,7 +35,8 @@ from bridges.system.directories import SERVICE_STATE
 FRESH_S: Final = 3600.0
 MOST_BYTES: Final = 16 << 20
 WANTS: Final = Path("etc/systemd/system/rmf-bridges.target.wants")
-USERS: Final = "users"
+PAGE_USERS: Final = Path("var/lib/rmf-bridge-page/passwords")
+"""The file of the page's users, where docs/how-to/page.md puts it."""
 SECRET: Final = 0o077
 
 
@@ -67,7 +68,7 @@ def _save(file: Path, root: Path, *, dry_run: bool) -> int:
     if not found:
         print(f"nothing to save: there is no {root / CONFIG}", file=sys.stderr)
         return os.EX_NOINPUT
-    secrets = [path for path in found if _is_secret(path)]
+    secrets = [path for path in found if _is_secret(path, root)]
     for path in secrets:
         print(f"left out, as a secret: /{path.relative_to(root)}; copy this file by hand")
     kept = [path for path in found if path not in secrets]
@@ -95,18 +96,24 @@ def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
                 archive.add(path, name, recursive=False)
 
 
-def _is_secret(path: Path) -> bool:
+def _is_secret(path: Path, root: Path) -> bool:
     """Return whether only the owner may read the file. Return False for the file of the page's users,
     and for a daemon's memory, because the backup must contain both."""
     if path.parent.name.endswith(".wants"):
         return False
-    return not path.stat().st_mode & SECRET and USERS not in path.name and path.name != KEPT
+    return not path.stat().st_mode & SECRET and not _is_private(path.relative_to(root))
+
+
+def _is_private(path: PurePath) -> bool:
+    """Return whether the file belongs to the owner of its folder, and only that owner may read it."""
+    return path == PAGE_USERS or path.name == KEPT
 
 
 def _found(root: Path) -> Iterator[Path]:
     """Yield the files to save."""
     yield from sorted(one for one in (root / CONFIG).rglob("*") if one.is_file())
     yield from sorted((root / SERVICE_STATE.relative_to("/")).glob(f"*/{KEPT}"))
+    yield from (one for one in (root / PAGE_USERS,) if one.is_file())
     yield from sorted((root / WANTS).glob("rmf-bridge*.service"))
 
 
@@ -116,7 +123,7 @@ def _read(file: Path) -> Iterator[tuple[PurePosixPath, tuple[bytes, float]]]:
     with tarfile.open(file) as archive:
         for member in archive:
             path = PurePosixPath(member.name)
-            homes = (CONFIG, SERVICE_STATE.relative_to("/"), WANTS)
+            homes = (CONFIG, SERVICE_STATE.relative_to("/"), PAGE_USERS, WANTS)
             if not any(path.is_relative_to(home) for home in homes) or ".." in path.parts:
                 raise ValueError(f"{member.name} is no file of a backup")
             if not member.isreg() or member.size > MOST_BYTES:
@@ -137,7 +144,7 @@ def _restore(saved: dict[PurePosixPath, tuple[bytes, float]], args: argparse.Nam
             continue
         if args.dry_run:
             print(f"write /{path}")
-        elif code := _write(args.root / path, content):
+        elif code := _write(args.root / path, content, private=_is_private(path)):
             return code
         else:
             print(f"written: /{path}")
@@ -170,10 +177,9 @@ def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
     return fresh
 
 
-def _write(path: Path, content: bytes) -> int:
-    """Write a file. Passwords of users, and memories, belong to the owner of the folder, and only that
-    owner may read them."""
-    private = USERS in path.name or path.name == KEPT
+def _write(path: Path, content: bytes, *, private: bool) -> int:
+    """Write a file. A `private` file belongs to the owner of the folder, and only that owner may read
+    it."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         files.replace(path, content)

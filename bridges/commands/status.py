@@ -32,10 +32,11 @@ IN_USE: Final[Mapping[str, tuple[str, ...]]] = {
     "dispenser": ("mode", "queue"),
     "ingestor": ("mode", "queue"),
     "alarm": (),
+    "fleet": ("doing",),
 }
 """The keys of the status that tell by whom a device is used, for each kind. A device of any other kind
 always counts as in use."""
-FREE: Final = ("-", "off", "", "IDLE")
+FREE: Final = ("-", "off", "", "IDLE", "nothing")
 IDLE, BUSY = 0, 4
 NOT_TOLD: Final = ("contacts", "counts", "faults", "input_age_s", "outputs", "refused")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bridges import cli
-from bridges.commands.backup import FRESH_S
+from bridges.commands.backup import FRESH_S, PAGE_USERS
 from bridges.runtime.runtime_directory import KEPT
 from bridges.runtime.services import make_user
 
@@ -25,17 +25,19 @@ def machine(tmp_path: Path) -> Path:
     memory of a supervisor."""
     root = tmp_path / "old"
     config, state = root / "etc/rmf-bridges", root / "var/lib/rmf-bridge/door_supervisor"
-    for folder in (config, state, root / WANTS):
+    for folder in (config, state, root / WANTS, (root / PAGE_USERS).parent):
         folder.mkdir(parents=True)
     shutil.copy(ROOT / "config/door_modbus.yaml", config / "ward.yaml")
     shutil.copy(ROOT / "config/door_modbus.yaml", config / "spare.yaml")
     (root / WANTS / "rmf-bridge@ward.service").symlink_to(
         "/usr/lib/systemd/system/rmf-bridge@.service"
     )
-    for name, mode in {"ward.token": 0o600, "page.users": 0o600, "page.env": 0o644}.items():
+    for name, mode in {"ward.token": 0o600, "page.env": 0o644}.items():
         (config / name).write_text(f"content of {name}")
         (config / name).chmod(mode)
     (state / KEPT).write_text("held")
+    (root / PAGE_USERS).write_text("ann: hash")
+    (root / PAGE_USERS).chmod(0o600)
     return root
 
 
@@ -86,7 +88,7 @@ def test_a_restored_machine_has_the_same_files_and_services_and_no_secret_was_sa
         ["systemd-sysusers", f"--root={new}", *make_user("ward").words[1:]],
         ["systemctl", f"--root={new}", "enable", "rmf-bridges.target", "rmf-bridge@ward.service"],
     ]
-    assert (new / "etc/rmf-bridges/page.users").stat().st_mode & 0o777 == 0o600
+    assert (new / PAGE_USERS).stat().st_mode & 0o777 == 0o600
 
 
 def test_an_old_memory_is_not_restored_because_it_would_open_a_door(

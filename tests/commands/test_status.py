@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from bridges import cli
-from bridges.commands.status import show, users
+from bridges.commands.status import IN_USE, show, users
+from bridges.kinds import kind_names
 from bridges.runtime import daemons as on_machine
 from bridges.runtime import faults
 from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, DaemonStatus, daemons
@@ -256,6 +257,8 @@ def test_an_unknown_name_is_answered_with_the_known_names(
         ("door", {"hold": "on"}, ["one: X is in use (hold on)"]),
         ("charger", {"request": "-", "robot": "fleet/a"}, ["one: X is in use (robot fleet/a)"]),
         ("door_supervisor", {"held_by": "-"}, []),
+        ("fleet", {"doing": "nothing"}, []),
+        ("fleet", {"doing": "dock to L1 pad"}, ["one: X is in use (doing dock to L1 pad)"]),
         ("dispenser", {"mode": "IDLE", "queue": "-"}, []),
         ("dispenser", {"mode": "BUSY", "queue": "-"}, ["one: X is in use (mode BUSY)"]),
         (
@@ -271,6 +274,10 @@ def test_a_device_with_a_user_or_of_an_unknown_kind_is_not_idle(
     status = {"kind": kind, "devices": {"X": device}}
     one = DaemonStatus(name="one", state="serving", by="service", status=status)
     assert list(users(one)) == told
+
+
+def test_each_kind_tells_by_whom_a_device_is_used() -> None:
+    assert IN_USE.keys() == set(kind_names())
 
 
 @pytest.mark.parametrize("state", ["old", "died", "left on", "unknown", "failed"])

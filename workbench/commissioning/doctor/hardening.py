@@ -200,7 +200,8 @@ def _root(mounts: str | None) -> Finding:
 
 
 def _files(config: Config, machine: Machine) -> Iterator[Finding]:
-    """Examine the modes of the YAML, of the YAML's folder, and of each file that the YAML names."""
+    """Examine the modes of the YAML, of the YAML's folder, and of each file that the YAML names. All of
+    them but the secrets must belong to root."""
     file = config.path.absolute()
     secrets, readable = (
         list(dict.fromkeys(Path(file) for _, file in named_files(config, keys)))
@@ -212,18 +213,25 @@ def _files(config: Config, machine: Machine) -> Iterator[Finding]:
         *((one, OTHERS_READ) for one in secrets),
     ]:
         try:
-            mode = machine.at(path).stat().st_mode
+            found = machine.at(path).stat()
         except OSError as error:
             bad += 1
-            yield unknown(FILES, f"the mode of {path}: {error.strerror}", do="run doctor with sudo")
+            yield unknown(
+                FILES, f"owner and mode of {path}: {error.strerror}", do="run doctor with sudo"
+            )
             continue
+        mode = found.st_mode
+        if path not in secrets and found.st_uid != machine.root_uid:
+            bad += 1
+            means = f"the user with the number {found.st_uid} can change it"
+            yield wrong(FILES, f"{path} does not belong to root", means, f"chown root {path}")
         if mode & forbidden:
             bad += 1
             means = "another user can read it" if path in secrets else "another user can change it"
             right = "600" if path in secrets else "go-w"
             yield wrong(FILES, f"{path} has mode {mode & 0o777:o}", means, f"chmod {right} {path}")
     if not bad:
-        yield ok(FILES, "the YAML and its files are closed to other users")
+        yield ok(FILES, "the YAML and its files belong to root, and are closed to other users")
 
 
 def _runs_as(service: dict[str, str] | None, own: str) -> Finding:

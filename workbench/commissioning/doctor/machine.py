@@ -51,7 +51,7 @@ class Machine:
     - `ioctl(device, request, argument)` returns the kernel's reply, or raises OSError.
     - `installed(package)` tells whether this Python can import the package.
     - `synchronised()` tells whether the clock is synchronised, or None if unknown.
-    - `uid` and `gids` belong to this process.
+    - `uid` and `gids` belong to this process. `root_uid` is the user who may change the system.
     """
 
     root: Path = Path("/")
@@ -60,6 +60,7 @@ class Machine:
     synchronised: Callable[[], bool | None] = _synchronised
     uid: int = field(default_factory=os.geteuid)
     gids: frozenset[int] = field(default_factory=lambda: frozenset({os.getegid(), *os.getgroups()}))
+    root_uid: int = 0
 
     def at(self, path: str | Path) -> Path:
         """Return the path below `root` that stands for an absolute path."""

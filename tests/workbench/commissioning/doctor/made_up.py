@@ -41,6 +41,7 @@ class MadeUp:
             lambda: self.synchronised,
             os.geteuid() + 1,
             frozenset(gids),
+            os.geteuid(),
         )
         self.user = User("pi", self.machine.uid, self.machine.gids, service=False)
         (root / "proc").mkdir()

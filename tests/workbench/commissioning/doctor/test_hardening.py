@@ -1,7 +1,9 @@
 """`doctor --hardening`, which judges each point of docs/how-to/harden.md. The doctor names the points
 that it cannot judge."""
 
+import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -207,7 +209,7 @@ def test_the_root_is_read_only_or_an_overlay(made: MadeUp, mounts: str, wanted: 
     assert levels(made, points.ROOT) == [wanted]
 
 
-def test_files_are_judged_by_their_modes(made: MadeUp) -> None:
+def test_files_are_judged_by_their_modes_and_owners(made: MadeUp) -> None:
     for name, mode in {"lift.yaml": 0o644, "ca.pem": 0o644, "lift.pem": 0o644}.items():
         made.write(f"/etc/rmf-bridges/{name}", mode=mode)
     made.write("/etc/rmf-bridges/lift.key", mode=0o600)
@@ -222,8 +224,15 @@ def test_files_are_judged_by_their_modes(made: MadeUp) -> None:
     (made.root / "etc/rmf-bridges/lift.key").unlink()
     assert found(made, points.FILES, config(TLS))[-1] == (
         "unknown",
-        "the mode of /etc/rmf-bridges/lift.key: No such file or directory",
+        "owner and mode of /etc/rmf-bridges/lift.key: No such file or directory",
     )
+    made.write("/etc/rmf-bridges/lift.key", mode=0o600)
+    made.write("/etc/rmf-bridges/lift.yaml", mode=0o644)
+    made.machine = replace(made.machine, root_uid=os.geteuid() + 1)
+    told = found(made, points.FILES, config(TLS))
+    assert {level for level, _ in told} == {"wrong"}
+    assert ("wrong", "/etc/rmf-bridges/lift.yaml does not belong to root") in told
+    assert ("wrong", "/etc/rmf-bridges/lift.key does not belong to root") not in told
 
 
 @pytest.mark.parametrize(
