@@ -483,7 +483,7 @@ class Site:
         def begin() -> None:
             self.air.cut_off(name, self.timeline.now + lasts_s)
 
-        return Ill("cut", name, "cut off", begin, lambda: None, lasts_s, lasts_s + 0.001)
+        return Ill("cut", name, "cut off", begin, lambda: None, lasts_s, lasts_s, exact=True)
 
 
 class _Defects(logging.Handler):

@@ -355,9 +355,9 @@ class Laws:
         In the first ARRIVED_S of the crossing the door may still be released.
         """
         for robot, since in crossing.items():
-            well = self._ills.well_since(name) + LATE_S <= since
             just = self._timeline.now - since < ARRIVED_S
-            self.require(just or not well, f"{name} is released with {robot} in it")
+            excused = just or self._excused(name, robot, since)
+            self.require(excused, f"{name} is released with {robot} in it")
 
     def _not_onto_an_obstruction(self, name: str, plant: DoorPlant) -> None:
         if not self._daemons[name].alive or "obstruction" not in plant._sensors:
@@ -404,17 +404,19 @@ class Laws:
     def boards(self, robot: str, lift: str, floor: str) -> None:
         """Let a robot enter the car over its threshold, with RMF's permission."""
         truth = self._lifts[lift]
+        self.note(f"{robot} goes into {lift} at {floor}")
+        if self._by_old_states(robot, lift):
+            return
         others = sorted(set(truth.inside) - {robot})
         self.require(not others, f"{robot} is let into {lift}, where {others} is")
-        self.note(f"{robot} goes into {lift} at {floor}")
-        if self._sees_old(robot, self._timeline.now):
-            return  # the lift may have ended this session long ago, and may serve another robot
         truth.inside[robot] = self._timeline.now
         truth.crossing[robot] = (floor, self._timeline.now)
 
     def leaves(self, robot: str, lift: str, floor: str) -> None:
         """Let a robot leave the car over its threshold."""
         self.note(f"{robot} goes out of {lift} at {floor}")
+        if self._by_old_states(robot, lift):
+            return
         self._lifts[lift].crossing[robot] = (floor, self._timeline.now)
 
     def in_doorway(self, robot: str, door: str) -> None:
@@ -459,6 +461,15 @@ class Laws:
         Such an adapter gets the old states in one burst, and RMF's phases do not read their stamps.
         """
         return self._ills.since_over(robot, "cut off") + LATE_S > at
+
+    def _by_old_states(self, robot: str, lift: str) -> bool:
+        """Return whether the robot crosses the threshold although the lift does not serve it now.
+
+        RMF's phase ended at an old state, and the robot has then waited for the open car. The lift may
+        have ended this session long ago, and may serve another robot.
+        """
+        shown = self._lifts[lift].session
+        return shown not in ("", robot) or self._sees_old(robot, self._timeline.now)
 
     def _doorway(self, name: str) -> None:
         for robot, since in self._doorways[name].items():

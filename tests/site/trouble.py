@@ -142,7 +142,8 @@ class Ill:
 
     `sort` is the name under which the day counts this trouble. `reset` is the technician's action after
     the repair, and returns whether it had an effect. If the trouble lasted at most `heals_s` (s), the
-    device recovers without a reset.
+    device recovers without a reset. `exact`: the trouble itself ends after `least_s`, so it never lasts
+    longer.
     """
 
     sort: str
@@ -155,6 +156,7 @@ class Ill:
     mode: FailureMode | None = None
     reset: Callable[[], bool] | None = None
     heals_s: float = 0.0
+    exact: bool = False
 
 
 class Trouble:
@@ -197,7 +199,7 @@ class Trouble:
         """Draw a trouble that begins at this time. Return the time of its repair."""
         ill = self._draw(self._random)
         lasts_s = self._random.uniform(ill.least_s, ill.most_s)
-        if self._random.random() < 0.1:
+        if self._random.random() < 0.1 and not ill.exact:
             lasts_s *= 3.0
         end = min(at + lasts_s, self.over_at)
         if at >= end:
