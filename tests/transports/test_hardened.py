@@ -123,6 +123,23 @@ def test_only_rmf_may_ask_and_only_the_lift_may_answer(
     assert len(ears) == 6
 
 
+def test_a_viewer_announces_no_publisher_so_it_makes_no_supervisor_passive(
+    nodes: dict[str, ZenohTransport],
+) -> None:
+    requests = nodes["rmf"].subscribe(LIFT_REQUESTS, lambda message: None)
+    states = nodes["rmf"].subscribe(LIFT_STATES, lambda message: None)
+    shows = nodes["lift"].publisher(LIFT_STATES)
+    wait_until(lambda: states.senders() == ["/lift"], "the lift is announced")
+    forged = [nodes["viewer"].publisher(topic) for topic in (LIFT_REQUESTS, LIFT_STATES)]
+    heard_by = shows.matched()
+    ear = nodes["viewer"].subscribe(LIFT_STATES, lambda message: None)
+    wait_until(
+        lambda: shows.matched() == heard_by + 1, "the viewer, which came later, is announced"
+    )
+    assert (requests.senders(), states.senders()) == ([], ["/lift"])
+    assert len([*forged, ear]) == 3  # all of them were open until now
+
+
 def test_a_stranger_without_a_certificate_does_not_come_in(
     router: Router, papers: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

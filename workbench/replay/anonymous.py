@@ -8,7 +8,7 @@ as the old names, because cores sort by names.
 
 The program's own words stay, because new words would change the recording. These words are keys and
 values of the YAML, words of a core, and topics. The YAML's comments are removed. The addresses of the
-YAML's buses become `192.0.2.1`.
+YAML's buses become `192.0.2.1`, also in the texts of errors.
 """
 
 import enum
@@ -16,11 +16,12 @@ import inspect
 import pkgutil
 import re
 import typing
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from types import ModuleType
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 import msgspec
 import yaml
@@ -68,7 +69,8 @@ def anonymous(incident: Incident) -> Incident:
     own = {*_subjects(incident), *_own_names(config, content)}
     whole = {*own, *_spoken_names(incident), *_remembered(incident)}
     found = {part for name in whole for part in name.split("/")}
-    swap = _swap(sorted(found - our_words() - {""}, key=lambda name: (-len(name), name)))
+    hosts = {_host(value): ADDRESS for value in _hosts(content.get("buses", {}))}
+    swap = _swap(sorted(found - our_words() - {"", *hosts}, key=_longest_first), hosts)
     return Incident(
         _head(incident.head, content, swap),
         [_entry(entry, swap) for entry in incident.entries],
@@ -76,14 +78,20 @@ def anonymous(incident: Incident) -> Incident:
     )
 
 
-def _swap(names: list[str]) -> Swap:
-    """Return a function that replaces names in a text. A name may be only a part of the text. The
-    longest name is replaced first."""
-    if not names:
+def _longest_first(name: str) -> tuple[int, str]:
+    return -len(name), name
+
+
+def _swap(names: list[str], hosts: Mapping[str, str]) -> Swap:
+    """Return a function that replaces names and hosts in a text. A name may be only a part of the text.
+    The longest name is replaced first."""
+    if not names and not hosts:
         return lambda text: text
     width = len(str(len(names)))
     aliases = {name: f"name{number:0{width}}" for number, name in enumerate(sorted(names), 1)}
-    pattern = re.compile(r"(?<!\w)(?:" + "|".join(map(re.escape, names)) + r")(?!\w)")
+    aliases |= hosts
+    every = sorted(aliases, key=_longest_first)
+    pattern = re.compile(r"(?<!\w)(?:" + "|".join(map(re.escape, every)) + r")(?!\w)")
     return lambda text: pattern.sub(lambda match: aliases[match[0]], text)
 
 
@@ -213,6 +221,20 @@ def _head(head: Head, content: dict[str, Any], swap: Swap) -> Head:
     content.get("rmf", {}).pop("zenoh", None)
     text = yaml.safe_dump(_swapped(content, swap), sort_keys=False, allow_unicode=True)
     return replace(head, yaml=text.encode(), file="/anonymous.yaml")
+
+
+def _hosts(part: object) -> Iterator[str]:
+    """Yield the values that `_hide_address` replaces."""
+    for key, value in part.items() if isinstance(part, dict) else ():
+        if key in HOSTS and isinstance(value, str):
+            yield value
+        else:
+            yield from _hosts(value)
+
+
+def _host(value: str) -> str:
+    """Return the host in a host's name or a URL. The drivers' errors name it."""
+    return urlsplit(value).hostname or value if "://" in value else value
 
 
 def _hide_address(part: object) -> None:

@@ -8,20 +8,21 @@ from pathlib import Path
 import pytest
 
 from bridges.blackbox import mcap_write
-from bridges.blackbox.entries import Head, Spoken
-from bridges.blackbox.incident import Incident
+from bridges.blackbox.entries import DaemonDied, Head, Spoken
+from bridges.blackbox.incident import Incident, Note
 from bridges.kinds import lift
 from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages import cdr
 from bridges.messages.definitions import LiftState
 from bridges.messages.releases import KILTED
 from tests.workbench.replay.test_replay import CORPUS
-from workbench.replay.anonymous import anonymous, our_words
+from workbench.replay.anonymous import ADDRESS, anonymous, our_words
 from workbench.replay.files import opened
 from workbench.replay.incidents import notes_in
 from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
+CONFIG = Path(__file__).parents[3] / "config"
 NAMES = (b"Lift1", b"Lift2", b"red", b"green", b"white", b"black", b"bay1", b"bay2", b"ward", b"L3")
 
 
@@ -73,6 +74,20 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
             LiftState(lift_name="name1", current_floor="name2", session_id="fleet/name3")
         ).cdr
     )
+
+
+def test_the_host_of_a_bus_is_hidden_in_the_texts_of_errors_too() -> None:
+    yaml = (CONFIG / "door_modbus.yaml").read_text().replace("host: 192.168.1.50", "host: plc.mary")
+    assert "plc.mary" in yaml
+    head = Head("r", 1, "1", "door", "/d.yaml", yaml.encode(), {}, False, {}, RecordingSettings())
+    note = Note(1.0, "FAULT", "DEVICE_LOST: plc.mary:502 does not answer", "ward")
+    told = anonymous(Incident(head, [DaemonDied(1.0, "no answer of plc.mary")], (note,)))
+
+    assert b"mary" not in told.head.yaml
+    assert [one.reason for one in told.entries if isinstance(one, DaemonDied)] == [
+        f"no answer of {ADDRESS}"
+    ]
+    assert told.notes[0].text == f"DEVICE_LOST: {ADDRESS}:502 does not answer"
 
 
 def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
