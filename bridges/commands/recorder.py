@@ -21,6 +21,8 @@ from bridges.system import directories, log
 from bridges.system.columns import aligned
 
 EVERY_S = 1.0
+SERVICE = Path("/var/lib/rmf-bridge-recorder")
+"""The folder in which `rmf-bridge-recorder.service` keeps its files."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after SIGTERM or SIGINT, and 69 if the library for recordings is missing."""
+    """Return 0 after SIGTERM or SIGINT, 69 if the library for recordings is missing, and 77 if this
+    user may not read the service's counts."""
     if args.csv or args.days is not None:
         return _tell_days(args)
     log.start()
@@ -68,7 +71,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _tell_days(args: argparse.Namespace) -> int:
-    found = days.read(args.output or _folder())
+    folder = args.output or (SERVICE if SERVICE.exists() else _folder())
+    if folder == SERVICE and not os.access(SERVICE, os.R_OK | os.X_OK):
+        print(
+            f"{SERVICE} is not readable for this user: repeat the command with sudo",
+            file=sys.stderr,
+        )
+        return os.EX_NOPERM
+    found = days.read(folder)
     if args.csv:
         print(days.as_csv(found), end="")
         return 0
