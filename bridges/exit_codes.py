@@ -115,7 +115,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         0: "all is well",
         1: "a daemon has a fault",
         2: "a daemon died or is silent",
-        3: "there is no daemon",
+        3: "there is no daemon, or this user may not see one",
         4: "with --idle: a device is in use, or nobody knows whether a device is in use",
     },
     "doctor": {
@@ -166,7 +166,11 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         69: "no ring can be read, or the library is missing",
         73: "the recording cannot be written",
     },
-    "recorder": {0: "SIGTERM or Ctrl-C", 69: "the library is missing"},
+    "recorder": {
+        0: "SIGTERM or Ctrl-C",
+        69: "the library is missing",
+        77: "this user may not read the counts of the service",
+    },
     "replay": {
         0: "every decision is the same",
         1: "a decision differs",
