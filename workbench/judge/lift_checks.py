@@ -261,7 +261,8 @@ def floors(history: LiftHistory) -> Finding:
 
 
 def destination(history: LiftHistory) -> Finding:
-    """Check that the car goes to the floor that its holder requested."""
+    """Check that the car goes to the floor that its holder requested. A session that the lift resumes
+    may still have its former destination."""
     state = history.new
     if state is None or not state.session_id or not state.destination_floor:
         return None
@@ -269,7 +270,8 @@ def destination(history: LiftHistory) -> Finding:
         return None  # the car goes to its recall floor
     floor, before = state.destination_floor, history.before
     changed = before is None or floor != before.destination_floor
-    within_s = ASKED_S if changed else float("inf")
+    resumed = history.session_before != state.session_id and _again(history, state)
+    within_s = ASKED_S if changed and not resumed else float("inf")
     if history.was_asked_to(floor, within_s):
         return KEPT
     if not history.known or state.session_id not in history.asks:
@@ -299,14 +301,18 @@ def lets_nobody_in(history: LiftHistory) -> Finding:
     return None if history.offered else KEPT
 
 
+def _again(history: LiftHistory, state: d.LiftState) -> bool:
+    """Return whether the state shows the session that had the lift last, and ended lately."""
+    return state.session_id == history.last and history.now - history.last_at < GRACE_S + LATE_S
+
+
 def grants_nothing(history: LiftHistory) -> Finding:
     """Check that no new session gets the lift during a hazard."""
     state, before = history.new, history.before
     if state is None or before is None or state.current_mode not in HAZARDS:
         return None
     new = state.session_id not in ("", before.session_id)
-    again = state.session_id == history.last and history.now - history.last_at < GRACE_S + LATE_S
-    if before.current_mode not in HAZARDS or again:
+    if before.current_mode not in HAZARDS or _again(history, state):
         return None
     if not new:
         since = history.seen.mode.since.at

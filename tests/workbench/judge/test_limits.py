@@ -367,6 +367,16 @@ LIFT: list[tuple[str, Story, float, float]] = [
         8,
         9,
     ),
+    (  # a resumed session has its former destination
+        "L8.destination",
+        lambda x: [
+            *(car(0.0), asks(0.5, floor="L1"), held(1.0, to="L1"), ends(2.0)),
+            *(car(float(t)) for t in range(2, int(2.0 + x))),
+            *(asks(2.0 + x), held(2.0 + x, to="L1"), held(4.0 + x, to="L1")),
+        ],
+        69.9,
+        70.1,
+    ),
     (
         "L10.board",
         lambda x: [
