@@ -113,7 +113,8 @@ def _found(root: Path) -> Iterator[Path]:
     """Yield the files to save."""
     yield from sorted(one for one in (root / CONFIG).rglob("*") if one.is_file())
     yield from sorted((root / SERVICE_STATE.relative_to("/")).glob(f"*/{KEPT}"))
-    yield from (one for one in (root / PAGE_USERS,) if one.is_file())
+    if (root / PAGE_USERS).is_file():
+        yield root / PAGE_USERS
     yield from sorted((root / WANTS).glob("rmf-bridge*.service"))
 
 

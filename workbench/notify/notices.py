@@ -137,16 +137,14 @@ class Notices:
         lasts_s = one.trouble.before_s + now - one.since
         if lasts_s < s.after_s or self._is_quiet(one, clock):
             return None
-        acknowledged = one.acknowledged
         if one.told_at is None or one.trouble.stage > one.told_stage:
             event: Event = "new"
-            acknowledged = False
         elif _repeats(one, s) and now - one.told_at >= s.again_s:
             event = "again"
         else:
             return None
         self.known[key] = replace(
-            one, told_at=now, told_stage=one.trouble.stage, acknowledged=acknowledged
+            one, told_at=now, told_stage=one.trouble.stage, acknowledged=False
         )
         return Notice(event, one.trouble, lasts_s)
 

@@ -69,7 +69,7 @@ def anonymous(incident: Incident) -> Incident:
     own = {*_subjects(incident), *_own_names(config, content)}
     whole = {*own, *_spoken_names(incident), *_remembered(incident)}
     found = {part for name in whole for part in name.split("/")}
-    hosts = {_host(value): ADDRESS for value in _hosts(content.get("buses", {}))}
+    hosts = {_host(bus[key]): ADDRESS for bus, key in _addresses(content.get("buses", {}))}
     swap = _swap(sorted(found - our_words() - {"", *hosts}, key=_longest_first), hosts)
     return Incident(
         _head(incident.head, content, swap),
@@ -216,33 +216,25 @@ def _literals(hint: object) -> Iterator[str]:
 
 
 def _head(head: Head, content: dict[str, Any], swap: Swap) -> Head:
-    for bus in content.get("buses", {}).values():
-        _hide_address(bus)
+    for bus, key in _addresses(content.get("buses", {})):
+        bus[key] = f"http://{ADDRESS}" if "://" in bus[key] else ADDRESS
     content.get("rmf", {}).pop("zenoh", None)
     text = yaml.safe_dump(_swapped(content, swap), sort_keys=False, allow_unicode=True)
     return replace(head, yaml=text.encode(), file="/anonymous.yaml")
 
 
-def _hosts(part: object) -> Iterator[str]:
-    """Yield the values that `_hide_address` replaces."""
+def _addresses(part: object) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield each mapping with an address, and the address's key."""
     for key, value in part.items() if isinstance(part, dict) else ():
         if key in HOSTS and isinstance(value, str):
-            yield value
+            yield part, key  # type: ignore[misc]
         else:
-            yield from _hosts(value)
+            yield from _addresses(value)
 
 
 def _host(value: str) -> str:
     """Return the host in a host's name or a URL. The drivers' errors name it."""
     return urlsplit(value).hostname or value if "://" in value else value
-
-
-def _hide_address(part: object) -> None:
-    for key, value in part.items() if isinstance(part, dict) else ():
-        if key in HOSTS and isinstance(value, str):
-            part[key] = f"http://{ADDRESS}" if "://" in value else ADDRESS  # type: ignore[index]
-        else:
-            _hide_address(value)
 
 
 def _swapped(value: Any, swap: Swap) -> Any:
