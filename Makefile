@@ -19,6 +19,7 @@ help:
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
+	@echo "             (SAVED=build/site: in shifts of 2 h, and on from the last shift in this file, in the same tree)"
 	@echo "             (SEEDS=20: a day of each seed under each party's rules, and their table; those in build/soak are not played again)"
 	@echo "             (SIZE='50 200 30 100': so many lifts, doors, chargers and robots)"
 	@echo "             (KILL_EVERY=27: no trouble but a kill of RMF's lift supervisor each 27 s)"
@@ -166,7 +167,7 @@ flood: .venv/ready
 # Without SEED one is drawn, and printed.
 soak: .venv/ready
 	@$(if $(SEEDS),$(BIN)/python -m tests.site.days --seeds $(SEEDS) --hours $(or $(HOURS),24) $(if $(RMF),--rmf $(RMF)),\
-	  $(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF)) $(if $(KILL_EVERY),--kill-every $(KILL_EVERY)) $(if $(SIZE),--size $(SIZE)))
+	  $(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF)) $(if $(KILL_EVERY),--kill-every $(KILL_EVERY)) $(if $(SIZE),--size $(SIZE)) $(if $(SAVED),--saved $(SAVED)))
 
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))

@@ -9,11 +9,15 @@ import secrets
 import sys
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 from tests.site.building import SITE, hospital
-from tests.site.day import SUPERVISORS, Site
+from tests.site.day import HOUR_S, SUPERVISORS, Site
 from tests.site.growth import growth
 from tests.site.laws import Broken
+from tests.site.saved import OtherCode, load, save
+
+SHIFT_H = 2.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -39,6 +43,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar=("LIFTS", "DOORS", "CHARGERS", "ROBOTS"),
         help="a larger site; by default 2 lifts, 5 doors, 3 chargers and 5 robots",
     )
+    parser.add_argument(
+        "--saved",
+        type=Path,
+        metavar="FILE",
+        help=f"play shifts of {SHIFT_H:g} h, keep the site in this file, and go on from there",
+    )
     parser.add_argument("--log", type=int, default=60, help="log lines printed after a failure")
     options = parser.parse_args(argv)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
@@ -48,9 +58,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error("--kill-every needs --rmf kilted or jazzy")
     size = hospital(*options.size) if options.size else SITE
     began, site = time.perf_counter(), Site(seed, options.rmf, options.kill_every, size)
-    _print(f"seed {seed}, {options.hours:g} hours, supervisors: {site.rmf}")
+    if options.saved and options.saved.exists():
+        try:
+            site = load(options.saved)
+        except OtherCode as other:
+            parser.error(str(other))
+        site.looks.clear()  # of another process
+    _print(f"seed {site.seed}, {options.hours:g} hours, supervisors: {site.rmf}")
     try:
-        site.run(options.hours, told=lambda look: _print(str(look)))
+        while (left_h := options.hours - site.timeline.now / HOUR_S) > 0.0:
+            site.run(min(SHIFT_H, left_h) if options.saved else left_h, lambda at: _print(str(at)))
+            if options.saved:
+                save(site, options.saved)
     except Broken as broken:
         return _failed(site, str(broken), options)
     took_s = time.perf_counter() - began
@@ -71,8 +90,9 @@ def _failed(site: Site, why: str, options: argparse.Namespace) -> int:
     _print(f"BROKEN {why}")
     kills = f" KILL_EVERY={options.kill_every:g}" if options.kill_every else ""
     size = f" SIZE='{' '.join(map(str, options.size))}'" if options.size else ""
+    saved = f" SAVED={options.saved}" if options.saved else ""
     hours = f"HOURS={options.hours:g} RMF={site.rmf}"
-    _print(f"to repeat: make soak SEED={site.seed} {hours}{kills}{size}")
+    _print(f"to repeat: make soak SEED={site.seed} {hours}{kills}{size}{saved}")
     return 1
 
 

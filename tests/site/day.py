@@ -4,6 +4,7 @@ import logging
 import random as the_random
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from random import Random
 
 from bridges.kinds.charger_coordinator import KIND as COORDINATOR
@@ -26,8 +27,8 @@ from tests.site.daemons import (
 from tests.site.fire_panels import FirePanels
 from tests.site.growth import Look, look
 from tests.site.laws import BOUND_S, Broken, Laws
-from tests.site.network import CLEAR, Air, Place
-from tests.site.robots import Places, Resident, heeds
+from tests.site.network import CLEAR, Air, Place, Weather
+from tests.site.robots import Places, Resident
 from tests.site.storeroom import Storeroom
 from tests.site.timeline import NEVER, Timeline
 from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable, pressable
@@ -46,6 +47,9 @@ SWEEP_S = 45.0
 """The time (s) before the end of the day at which RMF's supervisors restart. By then every robot has
 ended its tour."""
 LOOK_EVERY_S = 5.0
+LAG_S = 0.05
+"""The time (s) between the rounds of a supervisor in a hospital, whose machine is busy. In 0.05 s it
+gets ten messages."""
 HOUR_S = 3600.0
 
 
@@ -55,7 +59,8 @@ Jazzy."""
 
 
 class Site:
-    """A day at the site, which the seed determines. `run` raises `laws.Broken` when a law is broken.
+    """A day at the site, which the seed determines. `run` raises `laws.Broken` when a law is broken. A
+    day may have several shifts, one `run` after the other. `saved.py` keeps a site between two of them.
 
     `rmf` is one of SUPERVISORS. Without `rmf` the seed decides. With our supervisors the seed also
     decides the release of the fleet adapters. With `kill_every_s` the only trouble is the death of
@@ -82,11 +87,17 @@ class Site:
         self.air.sorts = size is not SITE
         self.devices = devices(timeline, size)
         self.daemons = {n: DeviceDaemon(timeline, self.air, d) for n, d in self.devices.items()}
+        self._lag_s = 0.0 if size is SITE else LAG_S
         self.supervisors = self._rmfs() if self.rmf != "ours" else self._ours()
         self.air.release = JAZZY if self.jazzy else KILTED
         self.charging = charging.settings(size.chargers, size.robots)
         self.coordinator = GraphDaemon(
-            timeline, self.air, "coordinator", COORDINATOR, settings=self.charging
+            timeline,
+            self.air,
+            "coordinator",
+            COORDINATOR,
+            settings=self.charging,
+            lag_s=self._lag_s,
         )
         self.coordinated = seed // len(SUPERVISORS) % 2 == 0
         self.nodes = [*self.supervisors, *([self.coordinator] if self.coordinated else [])]
@@ -103,11 +114,11 @@ class Site:
         self._people_at: dict[str, float] = {}
 
     def _ours(self) -> list[GraphDaemon | RmfsSupervisor]:
-        timeline, air = self.timeline, self.air
+        made = partial(GraphDaemon, self.timeline, self.air, lag_s=self._lag_s)
         return [
-            GraphDaemon(timeline, air, "lift_supervisor", LIFT_SUPERVISOR, wall_skew=1.5),
-            GraphDaemon(timeline, air, "lift_standby", LIFT_SUPERVISOR),
-            GraphDaemon(timeline, air, "door_supervisor", DOOR_SUPERVISOR),
+            made("lift_supervisor", LIFT_SUPERVISOR, wall_skew=1.5),
+            made("lift_standby", LIFT_SUPERVISOR),
+            made("door_supervisor", DOOR_SUPERVISOR),
         ]
 
     def _rmfs(self) -> list[GraphDaemon | RmfsSupervisor]:
@@ -115,25 +126,30 @@ class Site:
         return [lifts, rmfs_door_supervisor(self.timeline, self.air)]
 
     def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
-        """Run the whole day. After each hour `told` gets the resources in use."""
-        end = hours * HOUR_S
+        """Run the whole day, or its next shift. After each hour `told` gets the resources in use."""
+        began = self.timeline.now
+        end = began + hours * HOUR_S
         # Fix also the random time for which a supervisor waits when it meets a rival.
         the_random.seed(self.seed)
-        self._open()
+        if began:
+            self._next_shift()
+        else:
+            self._open()
+        self.timeline.after(30.0, self._live)
         if self.kill_every_s is None:
             self.trouble.begin(until=end - WIND_DOWN_S)
         else:
             self.trouble.over_at = end - WIND_DOWN_S
-            self.timeline.at(60.0, self._kill)
+            self.timeline.after(60.0, self._kill)
         self.timeline.at(end - WIND_DOWN_S, self._wind_down)
         self.timeline.at(end - SWEEP_S, self._sweep)
         with _defects_end_the_day():
-            hour = 0
+            hour = int(began / HOUR_S)
             while (hour := hour + 1) * HOUR_S < end:
                 self.timeline.run(hour * HOUR_S)
                 self._look(hour, told)
             self.timeline.run(end)
-        self._look(hours, told)
+        self._look(end / HOUR_S, told)
         self._close()
 
     def counts(self) -> dict[str, int]:
@@ -162,7 +178,12 @@ class Site:
         for party in parties:
             self.timeline.after(self.random.uniform(2.0, 6.0), party.start)
         self.timeline.after(LOOK_EVERY_S, self._watch)
-        self.timeline.after(30.0, self._live)
+
+    def _next_shift(self) -> None:
+        """Let the robots leave their homes again, with the weather of a new day."""
+        self.air.weather = Weather()
+        for robot in self.robots:
+            robot.goes_out()
 
     def _look(self, hour: float, told: Callable[[Look], None]) -> None:
         self.looks.append(look(hour))
@@ -303,9 +324,8 @@ class Site:
         )
 
     def _join(self, name: str) -> Place:
-        place = Place(self.air, name, lambda: None)
-        robot = next(robot for robot in self.robots if robot.name == name)
-        place.heeds = lambda message: heeds(robot.robot, message)
+        place = Place(self.air, name, lambda: None, choosy=True)
+        next(robot for robot in self.robots if robot.name == name).heeds = place.heed
         return place
 
     def _draw(self, random: Random) -> Ill:

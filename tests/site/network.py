@@ -22,12 +22,13 @@ from typing import Any
 from bridges.messages.definitions import Message
 from bridges.messages.heard import Sender
 from bridges.messages.releases import NEWEST
-from bridges.messages.topics import DOOR_STATES, LIFT_STATES, Topic
+from bridges.messages.topics import CHARGER_STATES, DOOR_STATES, LIFT_STATES, Topic
 from tests.site.timeline import NEVER, Timeline
 from tests.transports.memory import MemoryNetwork, MemoryTransport
 
 LEASE_S = 10.0
 STATES = (LIFT_STATES.name, DOOR_STATES.name)
+SORTED = (*STATES, CHARGER_STATES.name)
 RETAINED = "retained"
 """The name that stands in for the sender's name when a late joiner gets retained messages."""
 
@@ -59,8 +60,8 @@ class Air:
     samples.
 
     With `sorts`, a node gets no message that it would drop unread: a device gets only messages that
-    name it (`Place.subscribe_to`), and a robot only states that it `heeds`. In a hospital with 200
-    doors all but a few of the samples would be such messages.
+    name it (`Place.subscribe_to`), and a robot only states that it heeds (`Place.heed`), and those with
+    its session. In a hospital with 200 doors all but a few of the samples would be such messages.
     """
 
     def __init__(self, timeline: Timeline, random: Random) -> None:
@@ -75,7 +76,8 @@ class Air:
         self.counts = dict.fromkeys(("sent", "arrived", "lost", "late", "twice"), 0)
         self.sorts = False
         self.addressed: dict[str, tuple[NameOf, dict[str, list[_Ear]]]] = {}
-        self.heeding: dict[str, list[_Ear]] = {}
+        self.choosy: dict[str, dict[str, _Ear]] = {}
+        self.heeding: dict[str, dict[str, _Ear]] = {}
         self._random = random
         self._cut: dict[str, float] = {}
         self._arrived: dict[tuple[str, str, str], float] = {}
@@ -144,12 +146,15 @@ class Air:
 
 
 class Place(MemoryTransport):
-    """One node's place on the graph. `heard` runs after each sample that the node gets. `heeds` returns
-    whether a state can change anything at this node; None for a node that heeds every state."""
+    """One node's place on the graph. `heard` runs after each sample that the node gets. A `choosy` node
+    gets only the states that it heeds."""
 
-    def __init__(self, air: Air, name: str, heard: Callable[[], None]) -> None:
+    def __init__(
+        self, air: Air, name: str, heard: Callable[[], None], *, choosy: bool = False
+    ) -> None:
         super().__init__(air.memory, name, air.release)
-        self.heeds: Callable[[Any], bool] | None = None
+        self._choosy = choosy and air.sorts
+        self._heeded: frozenset[str] | None = None
         self._air = air
         self._heard = heard
 
@@ -159,11 +164,26 @@ class Place(MemoryTransport):
     def subscribe(
         self, topic: Topic[Any], received: Callable[[Any], None], *, others_only: bool = False
     ) -> Any:
-        if self._air.sorts and self.heeds and topic.name in STATES:
-            _add(self._air.heeding.setdefault(topic.name, []), _Ear(self, received, others_only))
+        if self._choosy and topic.name in SORTED:
+            self._air.choosy.setdefault(topic.name, {})[self.name] = _Ear(
+                self, received, others_only
+            )
             return None
         carried = partial(self._air.carry, self, topic, received)
         return super().subscribe(topic, carried, others_only=others_only)
+
+    def heed(self, topics: frozenset[str]) -> None:
+        """Get all states of these topics from now on. Of other topics get only the states with the
+        node's session."""
+        if topics == self._heeded or not self._choosy:
+            return
+        self._heeded = topics
+        for topic, ears in self._air.choosy.items():
+            heeding = self._air.heeding.setdefault(topic, {})
+            if topic in topics:
+                heeding[self.name] = ears[self.name]
+            else:
+                heeding.pop(self.name, None)
 
     def subscribe_to(
         self,
@@ -193,7 +213,7 @@ class Place(MemoryTransport):
 
 @dataclass(frozen=True)
 class _Ear:
-    """A device's subscription to messages with its name, or a robot's subscription to states."""
+    """A device's subscription to messages with its name, or a choosy node's subscription to states."""
 
     place: Place
     received: Callable[[Any], None]
@@ -227,8 +247,11 @@ class _Mouth:
         if topic in self._air.addressed:
             name_of, ears = self._air.addressed[topic]
             yield from ears.get(name_of(message), ())
-        for ear in self._air.heeding.get(topic, ()):
-            if ear.place.heeds is None or ear.place.heeds(message):
+        if topic in self._air.choosy:
+            heeding = self._air.heeding.get(topic, {})
+            yield from heeding.values()
+            session = getattr(message, "session_id", "")
+            if session not in heeding and (ear := self._air.choosy[topic].get(session)):
                 yield ear
 
     def matched(self) -> int:

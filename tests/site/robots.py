@@ -6,7 +6,7 @@ adapter has forgotten the task, and knows only the place of its robot. So the ro
 place.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field
 from random import Random
 from typing import Any, Protocol
@@ -25,6 +25,8 @@ FRESH_S = 2.5
 PAD_S = 2.0
 """The time (s) for the drive from the pad's edge onto the pad, or back."""
 CHARGER_PATIENCE_S = 8.0
+CHARGER = "a charger"
+"""What a robot waits for from the begin of its charge to the end."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,8 @@ class Resident:
 
     `join(name)` gives the robot's adapter a place on the graph. `pace` is the length of the robot's
     pauses relative to a real robot. `disturbed_at` is the time at which the adapter last died. After
-    that time a request in the robot's name may come from a supervisor, and not from the robot.
+    that time a request in the robot's name may come from a supervisor, and not from the robot. `heeds`
+    gets the names of the topics whose states can change anything for the robot.
     """
 
     def __init__(
@@ -121,6 +124,7 @@ class Resident:
         self.doorway = ""
         self.pad = ""
         self.robot: RobotContext
+        self.heeds: Callable[[frozenset[str]], None] = lambda topics: None
         self._timeline = timeline
         self._join = join
         self._ground = ground
@@ -159,8 +163,7 @@ class Resident:
         for topic in heard:
             self._place.subscribe(topic, self._hear)
         self._tell()
-        self._day = self._live()
-        self._go_on(True, first=True)
+        self._begin_day()
 
     def kill(self) -> None:
         """Kill the adapter. The robot stays at its place."""
@@ -171,6 +174,15 @@ class Resident:
         self._until, self._awaits, self.waits_for = NEVER, None, ""
         self._place.close()
         self._day.close()
+
+    def goes_out(self) -> None:
+        """Begin a new shift, at the place of the rest."""
+        self.homing = False
+        self._begin_day()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state without the day, which has ended when the robot is saved at rest."""
+        return {key: value for key, value in vars(self).items() if key != "_day"}
 
     @property
     def at_rest(self) -> bool:
@@ -212,6 +224,10 @@ class Resident:
         else:
             self._set_alarm()
 
+    def _begin_day(self) -> None:
+        self._day = self._live()
+        self._go_on(True, first=True)
+
     def _go_on(self, done: bool, first: bool = False) -> None:
         """Begin the next item of the day."""
         if self._awaits is not None and not done:
@@ -230,6 +246,16 @@ class Resident:
     def _set_alarm(self) -> None:
         wake_at = self.robot.wake_at() - EPOCH - self.skew
         self._alarm.set(min(self._until, wake_at))
+        self.heeds(frozenset(self._heeded()))
+
+    def _heeded(self) -> Iterator[str]:
+        """Yield the topics whose states can change anything for the robot."""
+        if isinstance(self.robot.phase, DoorOpen):
+            yield topics.DOOR_STATES.name
+        if self.robot.destination is not None or isinstance(self.robot.phase, EndLiftSession):
+            yield topics.LIFT_STATES.name
+        if self.waits_for == CHARGER:
+            yield topics.CHARGER_STATES.name
 
     def _say(self, said: Any) -> None:
         for topic, message in said:
@@ -329,7 +355,7 @@ class Resident:
         """Drive to the dedicated place until the robot has charged. The dedicated place may change
         meanwhile."""
         assert self._task is not None
-        self.waits_for, self.since = "a charger", self._timeline.now
+        self.waits_for, self.since = CHARGER, self._timeline.now
         self._task.begins()
         while not self.homing:
             where = self._task.dedicated
@@ -376,7 +402,7 @@ class Resident:
 
     def _charge(self) -> Day:
         """Try the stations until a station grants the request. Drive there, charge, and leave."""
-        self.waits_for, self.since = "a charger", self._timeline.now
+        self.waits_for, self.since = CHARGER, self._timeline.now
         while not self.homing:
             for charger in self._random.sample(self._places.chargers, len(self._places.chargers)):
                 state = self._station(charger)
@@ -452,17 +478,6 @@ class Resident:
     def _new_request(self) -> str:
         self._request += 1
         return f"{self.name}/{self._request}"
-
-
-def heeds(robot: RobotContext, message: Any) -> bool:
-    """Return whether this message can change anything for the robot."""
-    match message:
-        case d.DoorState():
-            return isinstance(robot.phase, DoorOpen)
-        case d.LiftState():
-            uses = robot.destination is not None or isinstance(robot.phase, EndLiftSession)
-            return uses or message.session_id == robot.requester_id
-    return True
 
 
 def _words(phase: Phase) -> str:

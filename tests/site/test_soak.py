@@ -1,5 +1,6 @@
 """A short day at the site for a few random seeds. `make soak` plays whole days."""
 
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -14,6 +15,7 @@ from tests.site.day import Site
 from tests.site.growth import Look, growth
 from tests.site.laws import Broken, Laws
 from tests.site.network import Air
+from tests.site.saved import OtherCode, load, save
 from tests.site.timeline import Timeline
 
 SEEDS = depth([2], [1, 2, 3])
@@ -115,6 +117,27 @@ def test_the_same_seed_gives_the_same_day() -> None:
         day.run(depth(0.03, 0.15))
     assert days[0].counts() == days[1].counts()
     assert list(days[0].laws.log) == list(days[1].laws.log)
+
+
+@pytest.mark.long(3)
+def test_a_saved_site_goes_on_as_if_it_had_not_been_saved(tmp_path: Path) -> None:
+    site, hours = Site(4, "ours", size=hospital(1, 2, 1, 2)), depth(0.12, 0.4)
+    site.run(hours)
+    save(site, tmp_path / "site")
+    days = [site, load(tmp_path / "site")]
+    for day in days:
+        day.run(hours)
+    assert days[0].counts() == days[1].counts()
+    assert list(days[0].laws.log) == list(days[1].laws.log)
+    assert days[0].counts()["rides"] > 2
+
+
+def test_a_site_that_other_code_has_saved_does_not_go_on(tmp_path: Path) -> None:
+    save(Site(4, size=hospital(1, 1, 1, 1)), tmp_path / "site")
+    kept = (tmp_path / "site").read_bytes()
+    (tmp_path / "site").write_bytes(bytes([kept[0] ^ 1]) + kept[1:])
+    with pytest.raises(OtherCode, match="saved by another version"):
+        load(tmp_path / "site")
 
 
 def test_growth_from_hour_to_hour_is_reported() -> None:

@@ -61,6 +61,10 @@ class Alarm:
         self._number += 1
         self._timeline.at(at, partial(self._rings, self._number))
 
+    def ring_by(self, at: float) -> None:
+        """Ring at this time, or earlier if that was set before."""
+        self.set(min(at, self._at))
+
     def _rings(self, number: int) -> None:
         if number == self._number:
             self._at = NEVER

@@ -41,9 +41,9 @@ ERROR: Final = ChargerStateValue.CHARGER_ERROR
 class SiteLimits:
     """The settings that the core needs.
 
-    `robots` maps a robot to its suitable stations, best first. `waits_at` maps a robot to the waypoint
-    where it waits. `places` maps a station and then a fleet to the station's waypoint in that fleet's
-    graph. `receivers` maps a receiver's id to its robot.
+    `robots` maps a robot, in the order of names, to its suitable stations, best first. `waits_at`
+    maps a robot to the waypoint where it waits. `places` maps a station and then a fleet to the
+    station's waypoint in that fleet's graph. `receivers` maps a receiver's id to its robot.
     """
 
     robots: Mapping[RobotName, tuple[str, ...]]
@@ -72,7 +72,7 @@ class SiteLimits:
     @classmethod
     def of(cls, settings: CoordinatorSettings) -> "SiteLimits":
         """Make the limits from the YAML."""
-        robots = settings.robots()
+        robots = dict(sorted(settings.robots().items()))
         return cls(
             robots={who: tuple(robot.stations) for who, robot in robots.items()},
             waits_at={who: robot.waits_at for who, robot in robots.items()},

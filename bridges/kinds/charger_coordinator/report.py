@@ -258,7 +258,7 @@ def _assignments(
     """
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     allotted = memory.allotted
-    for who in sorted(site.robots):
+    for who in site.robots:
         station, told = allotted.get(who), wrong_pad.is_nudged(memory, who, now)
         charges = (station is None) == told
         mode = d.ChargingMode.MODE_CHARGE if charges else d.ChargingMode.MODE_WAIT
