@@ -44,7 +44,8 @@ PART_S: Final = 300.0
 class Recorder:
     """The reader of all daemons' rings, which writes the recordings.
 
-    `folders` returns the daemons' runtime directories. `now` returns the machine's time (s).
+    `folders` returns the daemons' runtime directories. `now` returns the machine's time (s), and
+    `today` the present day.
     """
 
     def __init__(
@@ -52,10 +53,13 @@ class Recorder:
         folders: Callable[[], Iterable[Path]],
         recordings: Recordings,
         now: Callable[[], float],
+        today: Callable[[], date] = date.today,
     ) -> None:
         self._folders = folders
         self._recordings = recordings
         self._now = now
+        self._today = today
+        self._day = today()
         self._followed: dict[Path, _Followed] = {}
         self._seen_dead: set[tuple[int, int]] = set()
         self._died_at: dict[str, float] = {}
@@ -70,10 +74,11 @@ class Recorder:
             self._look_at(folder)
         for folder in [known for known in self._followed if known not in folders]:
             self._finish(self._followed.pop(folder))
-        if self._now() >= self._counted_at + COUNTED_S:
+        if self._now() >= self._counted_at + COUNTED_S or self._today() != self._day:
             self._counted_at = self._now()
             for followed in self._followed.values():
                 self._count(followed)
+            self._day = self._today()
 
     def close(self) -> None:
         """Write the recordings that have begun, although they are incomplete. Add the counts of the
@@ -112,9 +117,9 @@ class Recorder:
         self._count(followed)
 
     def _count(self, followed: "_Followed") -> None:
-        """Add the counts of the daemon's own devices to the present day in the file of daily counts."""
+        """Add the counts of the daemon's own devices to their day in the file of daily counts."""
         try:
-            days.add(self._recordings.folder, date.today(), followed.counts())
+            days.add(self._recordings.folder, self._day, followed.counts())
         except OSError as error:
             log.warning(pairs("not_counted", folder=self._recordings.folder, reason=error))
 

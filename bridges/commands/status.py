@@ -167,6 +167,8 @@ def _state(one: DaemonStatus) -> str:
             )
         case "left on":
             return "has died, and its outputs were not verified off"
+        case "failed":
+            return f"does not start; `rmf-bridge log {one.name}` tells why"
         case "unknown":
             return "cannot be seen"
         case "serving" if one.status.get("passive"):

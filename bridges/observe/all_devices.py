@@ -11,7 +11,7 @@ from bridges.messages.heard import Heard, Own
 from bridges.observe.alarms import ObservedAlarm, PublishedAlarms, alarms
 from bridges.observe.charger import ObservedCharger
 from bridges.observe.device import ObservedDevice
-from bridges.observe.diagnosis import Diagnosis, about, of_node, report
+from bridges.observe.diagnosis import SIMULATED, Diagnosis, about, of_node, report
 from bridges.observe.door import ObservedDoor
 from bridges.observe.lift import END, ObservedLift
 from bridges.observe.limits import (
@@ -126,6 +126,23 @@ class ObservedGraph(Generic[D]):
     def alarms(self) -> list[ObservedAlarm]:
         """Return the alarms of all nodes, as of the last message."""
         return [*alarms(self.nodes, self.published, self.now.at)]
+
+    def daemon_of(self, said: Diagnosis) -> Diagnosis | None:
+        """Return what the daemon behind this report said of itself at that time; None if unknown."""
+        daemon = self.nodes.get(f"{said.name.partition(': ')[0]}: daemon")
+        return daemon if daemon and daemon.is_current(said.last.at) else None
+
+    def simulated(self, said: Diagnosis) -> bool:
+        """Return whether the daemon behind this report moves no hardware."""
+        daemon = self.daemon_of(said)
+        if daemon is None:
+            return False
+        # A fault of the daemon takes the place of SIMULATED in its message.
+        return daemon.value("simulated") == "yes" or SIMULATED in daemon.message
+
+    def is_simulated(self, device: AnyDevice) -> bool:
+        """Return whether the device's own daemon moves no hardware, as of the device's last state."""
+        return any(said.kind == device.kind and self.simulated(said) for said in device.said)
 
     def make(self, kind: words.Kind, name: str) -> D:
         """Make a device that has not yet heard a message."""

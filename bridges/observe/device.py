@@ -75,6 +75,13 @@ class ObservedDevice(ABC, Generic[T]):
         self._back: deque[tuple[float, float]] = deque(maxlen=8)
         self._flips: deque[tuple[float, float]] = deque(maxlen=100)
 
+    @property
+    def said(self) -> list[Diagnosis]:
+        """Our nodes' reports on the device that belong to its last state. So a silent device keeps its
+        faults, and stays simulated."""
+        last = self.last_state
+        return [one for one in self.diagnoses.values() if last and one.is_current(last.at)]
+
     def published_by(self, sender: Sender | None, now: Moment) -> None:
         """Note the publisher of a state."""
         self._publishers.hear(sender, now.at)

@@ -26,6 +26,9 @@ NamedCertificate = tuple[str, str, str]
 
 RUNS: Final = ("active (running)", "activating (start)", "deactivating (stop-sigterm)")
 """The states of a systemd unit whose process runs."""
+FAILS: Final = ("failed", "activating (auto-restart")
+"""The beginnings of the states of a unit whose process has ended by itself. Our units start again for
+ever, except after an invalid file."""
 
 ASK_SYSTEMD_S: Final = 3.0
 
@@ -76,7 +79,7 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
     - `old`: The daemon runs, but its status is not fresh.
     - `died`: The daemon has died, because it has left its status file.
     - `left on`: The daemon has died, and its outputs are not verified off.
-    - `failed`: systemd has given up starting the daemon.
+    - `failed`: The daemon does not start. systemd tries again, or has given up.
     - `stopped`: The daemon does not run.
     - `unknown`: This user has no permission to read the daemon's files.
     """
@@ -140,7 +143,7 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
         one.state = "died"
     elif left := _unreleased(folder):
         one.state, one.why = "left on", left
-    elif unit.startswith("failed"):
+    elif unit.startswith(FAILS):
         one.state = "failed"
     return one
 
@@ -159,7 +162,7 @@ def _unreleased(folder: Path) -> str:
 
 
 def _without_directory(unit: str) -> str:
-    return "failed" if unit.startswith("failed") else "stopped"
+    return "failed" if unit.startswith(FAILS) else "stopped"
 
 
 def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:

@@ -1,7 +1,7 @@
 """The daily counts of this machine's devices. The counts are made from the rings, and stored in a file.
 They are shown as a table or as CSV."""
 
-from datetime import date
+from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
@@ -83,7 +83,10 @@ def test_the_recorder_counts_its_lifts_rides_and_writes_once_an_hour_and_at_its_
     machine.live(20, waits)
     machine.live(1, lambda: machine.say("lift_states", here, sent=True))
     assert machine.files() == []
+    machine.day += timedelta(days=1)
+    machine.live(1)
+    assert list(days.read(machine.out)) == ["2026-11-24"]
     machine.recorder.close()
     found = days.read(machine.out)
-    [row] = days.rows(found, date.fromisoformat(max(found)), 1)
+    [row] = days.rows(found, DAY, 1)
     assert row.cells[:7] == ("lift", "Lift1", "0", "1", "≤ 20", "≤ 20", "1")

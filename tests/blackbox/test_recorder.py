@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Callable
+from datetime import date
 from functools import partial
 from pathlib import Path
 
@@ -45,12 +46,15 @@ class Machine:
 
     def __init__(self, folder: Path, keep: RecordingSettings = RecordingSettings()) -> None:  # noqa: B008
         self.now = 1000.0
+        self.day = date(2026, 11, 24)
         self.pid = os.getpid()
         self.keep = keep
         self.runtime = folder / "run" / "lift1"
         self.runtime.mkdir(parents=True)
         self.out = folder / "out"
-        self.recorder = Recorder(lambda: [self.runtime], Recordings(self.out), lambda: self.now)
+        self.recorder = Recorder(
+            lambda: [self.runtime], Recordings(self.out), lambda: self.now, lambda: self.day
+        )
         self.runs = 0
         self.start()
 

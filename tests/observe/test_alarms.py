@@ -143,16 +143,17 @@ def test_watch_has_a_row_for_the_alarm_and_for_each_panel() -> None:
         BoardRow("alarm", "bridge", stands, simulated=True),
         BoardRow("alarm", "Panel", "alarm: fire", simulated=True, faults=faults),
     ]
+    silent = "SILENT 60 s"
     assert board.rows(60.0, WALL + 60) == [
-        BoardRow("alarm", "bridge", stands, mark="SILENT", simulated=True)
+        BoardRow("alarm", "bridge", stands, mark=silent, simulated=True),
+        BoardRow("alarm", "Panel", "alarm: fire", mark=silent, simulated=True, faults=faults),
     ]
     board.take(told(61.0, "drill"))
-    [row, _] = [*board.rows(61.0, WALL + 61), None]
-    assert row is not None
+    row, _ = board.rows(61.0, WALL + 61)
     assert row.state == "DRILL; every fleet must stand still"
     board.take(told(62.0, "quiet"))
-    assert board.rows(62.0, WALL + 62) == [BoardRow("alarm", "bridge", "no alarm")]
-    assert board.rows(99.0, WALL + 99) == []
+    assert board.rows(62.0, WALL + 62)[0] == BoardRow("alarm", "bridge", "no alarm")
+    assert board.rows(99.0, WALL + 99)[0].mark == "SILENT 37 s"
 
 
 def test_explain_begins_with_the_alarm_for_which_the_robots_stand() -> None:

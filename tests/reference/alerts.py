@@ -14,6 +14,8 @@ HEAD: Final = """\
 # Alert rules for Prometheus (docs/how-to/monitor.md). `make reference` makes this file from
 # bridges/runtime/faults.yaml and tests/reference/alerts.py.
 """
+UNHEARD: Final = ("NO_ROUTER", "ROUTER_ON_LOOPBACK")
+"""The faults of a node that is not on the graph. The rule DaemonFault tells them."""
 LONG_WAIT: Final = (
     "histogram_quantile(0.95, sum by (device, le)"
     ' (increase(rmf_bridge_wait_seconds_bucket{kind="lift"}[1h])))'
@@ -99,6 +101,16 @@ def _fixed() -> Iterator[dict[str, Any]]:
         "Run `rmf-bridge log {{ $labels.daemon }}` on {{ $labels.instance }}.",
     )
     yield _rule(
+        "DaemonFault",
+        # Not the faults that reach the graph: those have rules of their own.
+        "rmf_bridge_daemon_fault == 1 unless on (daemon, code)"
+        ' label_replace(rmf_bridge_device_fault{kind="daemon"}, "daemon", "$1", "device", "(.+)")',
+        "1m",
+        "critical",
+        "Daemon {{ $labels.daemon }} has {{ $labels.code }}, and does not reach RMF to tell it.",
+        "Run `rmf-bridge status {{ $labels.daemon }}` on {{ $labels.instance }}: it tells what to do.",
+    )
+    yield _rule(
         "RecorderDiskFull",
         f"rmf_bridge_recordings_disk_free_bytes < {LEAST_FREE}",
         "5m",
@@ -161,6 +173,8 @@ def _fixed() -> Iterator[dict[str, Any]]:
 
 def _faults() -> Iterator[dict[str, Any]]:
     for code, remedy in faults.remedies().items():
+        if code in UNHEARD:
+            continue
         metric = f'rmf_bridge_device_fault{{code="{code}"}}'
         name = "".join(part.capitalize() for part in code.split("_"))
         about = "{{ $labels.kind }} {{ $labels.device }}"

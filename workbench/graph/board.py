@@ -18,7 +18,7 @@ from bridges.messages import words
 from bridges.messages.heard import Heard
 from bridges.observe.alarms import alarms
 from bridges.observe.all_devices import AnyDevice, ObservedGraph, PlainGraph
-from bridges.observe.diagnosis import COORDINATOR, PANEL, PASSIVE, SIMULATED, Diagnosis
+from bridges.observe.diagnosis import COORDINATOR, PANEL, PASSIVE, Diagnosis
 from bridges.observe.door import ObservedDoor
 from bridges.observe.limits import SILENT_S
 from bridges.observe.robots import ObservedRobot, robots, waits
@@ -109,7 +109,7 @@ class Board:
             (one.kind, words.printable(one.id))
             for one in self._graph.stated()
             if one.first_state and now - one.first_state.at < SETTLES_S
-            if not any(said.kind == one.kind for said in _said(one))
+            if not any(said.kind == one.kind for said in one.said)
         }
 
     def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[BoardRow]:
@@ -124,7 +124,7 @@ class Board:
         return [*devices, *self._alarms(now), *self._coordinators(now), *self._robots(now)]
 
     def _device(self, one: AnyDevice, now: float, wall: float) -> BoardRow:
-        found = _said(one)
+        found = one.said
         state: words.Stated = one.state  # type: ignore[assignment]
         held_by = words.holder(state)
         if isinstance(one, ObservedDoor):
@@ -137,7 +137,7 @@ class Board:
             words.printable(", ".join(filter(None, map(_waiting, found)))),
             _age(one.stamped_at, wall),
             _mark(one, now),
-            any(said.kind == one.kind and self._simulated(said) for said in found),
+            self._graph.is_simulated(one),
             _faults(found),
         )
 
@@ -146,23 +146,20 @@ class Board:
         nodes = self._graph.nodes
         for one in alarms(nodes, self._graph.published, now):
             daemon = nodes.get(f"{one.node}: daemon")
-            mark = "" if one.current or not one.stands else "SILENT"
-            if one.current or one.stands:
-                simulated = daemon is not None and self._simulated(daemon)
-                text, faults = one.condition, _faults([daemon] if daemon else [])
-                yield BoardRow(
-                    "alarm", one.node, text, mark=mark, simulated=simulated, faults=faults
-                )
+            simulated = daemon is not None and self._graph.simulated(daemon)
+            text, faults = one.condition, _faults([daemon] if daemon else [])
+            mark = _silent(daemon, now) if daemon else ""
+            yield BoardRow("alarm", one.node, text, mark=mark, simulated=simulated, faults=faults)
         for name, panel in nodes.items():
-            if panel.kind == PANEL and not name.endswith(": daemon") and panel.is_current(now):
+            if panel.kind == PANEL and not name.endswith(": daemon"):
                 state = f"{panel.value('state')}: {panel.value('active') or 'no source'}"
                 shown = words.printable(name.partition(": ")[2])
-                simulated = self._simulated(panel)
                 yield BoardRow(
                     "alarm",
                     shown,
                     words.printable(state),
-                    simulated=simulated,
+                    mark=_silent(panel, now),
+                    simulated=self._graph.simulated(panel),
                     faults=_faults([panel]),
                 )
 
@@ -170,9 +167,7 @@ class Board:
         for name, diagnosis in self._graph.nodes.items():
             if diagnosis.kind != COORDINATOR or name.endswith(": daemon"):
                 continue
-            if not diagnosis.is_current(now):
-                continue
-            daemon = self._daemon(diagnosis, now)
+            daemon = self._graph.daemon_of(diagnosis)
             passive = daemon.value(PASSIVE) if daemon else ""
             queue = diagnosis.value("queue")
             yield BoardRow(
@@ -180,7 +175,8 @@ class Board:
                 words.printable(name.partition(": ")[0]),
                 words.printable(f"passive: {passive}") if passive else _coordinates(diagnosis),
                 waiting=words.printable(queue),
-                simulated=self._simulated(diagnosis),
+                mark=_silent(diagnosis, now),
+                simulated=self._graph.simulated(diagnosis),
                 faults=_faults([diagnosis]),
             )
 
@@ -205,28 +201,15 @@ class Board:
             held_by=self._places.get(one.who, "-"),
             waiting=words.printable(", ".join(f"{d.kind} {d.id}: {w.wants}" for d, w in asks)),
             age=_seconds(said.value("input_age_s"), silent_s),
-            mark="" if said.is_current(now) else f"SILENT {silent_s:.0f} s",
-            simulated=self._simulated(said),
+            mark=_silent(said, now),
+            simulated=self._graph.simulated(said),
             faults=_faults([said]),
         )
 
-    def _daemon(self, diagnosis: Diagnosis, now: float) -> Diagnosis | None:
-        daemon = self._graph.nodes.get(f"{diagnosis.name.partition(': ')[0]}: daemon")
-        return daemon if daemon and daemon.is_current(now) else None
 
-    def _simulated(self, diagnosis: Diagnosis) -> bool:
-        daemon = self._daemon(diagnosis, diagnosis.last.at)
-        simulated = (
-            daemon.value("simulated") == "yes" if daemon else False
-        )  # a fault may hide SIMULATED in the message
-        return daemon is not None and (simulated or SIMULATED in daemon.message)
-
-
-def _said(device: AnyDevice) -> list[Diagnosis]:
-    """Return our nodes' diagnostics about this device that belong to its last state. So a silent device
-    keeps its faults, and stays simulated."""
-    assert device.last_state is not None  # only devices with a state have a row
-    return [one for one in device.diagnoses.values() if one.is_current(device.last_state.at)]
+def _silent(said: Diagnosis, now: float) -> str:
+    """Return the mark of a row whose report no longer comes."""
+    return "" if said.is_current(now) else f"SILENT {now - said.last.at:.0f} s"
 
 
 def _waiting(said: Diagnosis) -> str:

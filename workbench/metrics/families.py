@@ -23,7 +23,6 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.all_devices import AnyDevice, ObservedGraph
 from bridges.observe.charger import ObservedCharger
-from bridges.observe.diagnosis import SIMULATED
 from bridges.observe.door import ObservedDoor
 from bridges.observe.lift import NOBODY, ObservedLift
 from bridges.observe.requesters import Moment
@@ -81,7 +80,7 @@ def _states(
         shown = _mode(one)
         for known in MODES[one.kind]:
             mode.add_metric((*names, words.plain(MODES[one.kind], known)), known == shown)
-        simulated.add_metric(names, any(_simulated(graph, name) for name in one.diagnoses))
+        simulated.add_metric(names, graph.is_simulated(one))
     yield from (up, age, mode, simulated)
 
 
@@ -104,8 +103,8 @@ def _trouble(
     )
     refused = CounterMetricFamily(
         f"{PREFIX}device_refusals",
-        "Requests that the device's daemon has refused, by reason.",
-        labels=(*DEVICE, "reason"),
+        "Requests that this node has refused, by reason.",
+        labels=(*DEVICE, "node", "reason"),
     )
     for one in devices:
         names = _names(one)
@@ -113,12 +112,12 @@ def _trouble(
         for code in sorted({code for report in said for code in report.faults}):
             fault.add_metric((*names, label(code)), 1)
         publishers.add_metric(names, len(one.publishers(now)))
-        counts: dict[str, int] = {}
         for report in one.diagnoses.values():
+            node, counts = label(report.name.partition(": ")[0]), dict[str, int]()
             for reason, (count, _) in report.refused.items():
                 counts[label(reason)] = counts.get(label(reason), 0) + count
-        for reason, count in counts.items():
-            refused.add_metric((*names, reason), count)
+            for reason, count in counts.items():
+                refused.add_metric((*names, node, reason), count)
     yield from (fault, publishers, refused)
 
 
@@ -227,13 +226,6 @@ def _held(device: AnyDevice) -> bool:
         case ObservedWorkcell():
             return bool(device.queue.value)
     return False
-
-
-def _simulated(graph: ObservedGraph[Any], reporter: str) -> bool:
-    """Return whether the report's daemon is simulated, so that it moves no hardware. A report's name is
-    `<node>: <device>`."""
-    daemon = graph.nodes.get(f"{reporter.partition(': ')[0]}: daemon")
-    return daemon is not None and SIMULATED in daemon.message
 
 
 def _gauge(name: str, text: str, labels: tuple[str, ...]) -> GaugeMetricFamily:

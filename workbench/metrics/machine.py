@@ -102,6 +102,8 @@ def _daemons(every: Iterable[DaemonStatus]) -> Iterator[Metric]:
         left_on.add_metric(names, one.state == "left on")
         if one.age_s is not None:
             age.add_metric(names, one.age_s)
+        if one.state != "serving":
+            continue
         if (left := _number(one.status.get("watchdog_slack_s"))) is not None:
             slack.add_metric(names, left)
         for found in one.status.get("faults", ()):

@@ -347,7 +347,8 @@ def test_the_coordinator_has_a_row_with_its_queue_its_faults_and_whether_it_assi
         "requests chargers that another node assigns, schedule 22:00-05:00 tiny to 98 %: under way"
     )
     assert board(told(passive=False)).rows(100.0, WALL) == [replace(row, state=beside)]
-    assert board(told(passive=False)).rows(104.0, WALL) == []
+    silent = replace(row, state=beside, mark="SILENT 4 s")
+    assert board(told(passive=False)).rows(104.0, WALL) == [silent]
 
 
 def test_made_up_daemons_and_robots_are_bounded_and_give_way_when_they_fall_silent() -> None:

@@ -129,9 +129,37 @@ def test_faults_and_refusals_of_the_daemon_are_series_and_end_with_its_silence()
     fault = 'rmf_bridge_device_fault{code="FIRE",device="Lift1",kind="lift"}'
     found = scraped(story)
     assert found[fault] == 1.0
-    refused = 'rmf_bridge_device_refusals_total{device="Lift1",kind="lift",reason="unknown floor"}'
-    assert found[refused] == 3.0
+    of_node = 'device="Lift1",kind="lift",node="node",reason="unknown floor"'
+    assert found[f"rmf_bridge_device_refusals_total{{{of_node}}}"] == 3.0
     assert fault not in scraped(story.passes(10))
+
+
+def _reports(node: str, kind: str, **values: str) -> d.DiagnosticArray:
+    """Return a node's reports on Lift1 and on itself."""
+    pairs = tuple(d.KeyValue(*pair) for pair in {"kind": kind, **values}.items())
+    said = [
+        d.DiagnosticStatus(0, f"{node}: {about}", "NOT_KEPT", about_id, pairs)
+        for about, about_id in (("Lift1", "Lift1"), ("daemon", node))
+    ]
+    return d.DiagnosticArray(status=tuple(said))
+
+
+def test_refusals_never_decrease_when_one_of_two_nodes_starts_anew() -> None:
+    story = Story().lift()
+    for node, kind, count in (("a", "lift", "9"), ("s", "lift_supervisor", "5")):
+        story.hear("/diagnostics", _reports(node, kind, **{"refused other session": count}))
+    story.hear("/diagnostics", _reports("s", "lift_supervisor", **{"refused other session": "1"}))
+    found = {name: value for name, value in scraped(story).items() if "refusals_total" in name}
+    assert sorted(found.values()) == [1.0, 9.0]
+
+
+def test_a_simulated_device_is_simulated_also_with_a_fault_and_until_real_hardware_serves() -> None:
+    simulated = f"rmf_bridge_device_simulated{LIFT1}"
+    story = Story().lift().hear("/diagnostics", _reports("sim", "lift", simulated="yes")).lift()
+    assert scraped(story)[simulated] == 1.0
+    assert scraped(story.passes(50))[simulated] == 1.0
+    story.lift().hear("/diagnostics", _reports("real", "lift", simulated="no"))
+    assert scraped(story)[simulated] == 0.0
 
 
 def test_no_name_from_the_network_breaks_a_line_or_grows_without_bound() -> None:
@@ -144,14 +172,17 @@ def test_no_name_from_the_network_breaks_a_line_or_grows_without_bound() -> None
 def test_a_daemons_counts_come_from_its_status_and_a_dead_daemon_is_down() -> None:
     counts = {"scans": 7, "failed_scans": 2, "scan_seconds": 0.5, "switched_on": {"call": 3}}
     device = {"counts": counts, "input_age_s": 0.1, "faults": []}
-    status = {"devices": {"Lift1": device}, "faults": [{"code": "RIVAL", "detail": ""}]}
+    faults = [{"code": "RIVAL", "detail": ""}]
+    status = {"devices": {"Lift1": device}, "faults": faults, "watchdog_slack_s": 7.9}
     serving = DaemonStatus(name="lift", state="serving", by="service", status=status, age_s=0.5)
-    dead = DaemonStatus(name="door", state="left on", by="service")
+    dead = DaemonStatus(name="door", state="left on", by="service", status=status, age_s=3600.0)
     found = samples(of_machine([serving, dead]))
     assert {name: value for name, value in found.items() if value} == {
         'rmf_bridge_daemon_up{daemon="lift"}': 1.0,
         'rmf_bridge_daemon_outputs_unverified{daemon="door"}': 1.0,
         'rmf_bridge_daemon_status_age_seconds{daemon="lift"}': 0.5,
+        'rmf_bridge_daemon_status_age_seconds{daemon="door"}': 3600.0,
+        'rmf_bridge_daemon_watchdog_slack_seconds{daemon="lift"}': 7.9,
         'rmf_bridge_daemon_fault{code="RIVAL",daemon="lift"}': 1.0,
         'rmf_bridge_daemon_device_scans_total{daemon="lift",device="Lift1"}': 7.0,
         'rmf_bridge_daemon_device_failed_scans_total{daemon="lift",device="Lift1"}': 2.0,
