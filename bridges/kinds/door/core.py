@@ -18,6 +18,8 @@ DOOR-4. In a fire alarm the site's `on_fire` decides. `open` holds the door open
    stop repeating its request.
 DOOR-5. Without a fresh reading the state is OFFLINE and the hold is off. The latch is kept, and the
    hold comes on again with the first good reading.
+   If no write succeeds for `stale_after_s`, the state is OFFLINE too, because nobody knows whether the
+   door is held. The wanted hold stays as it was.
 DOOR-6. The state is OPEN only if the limit contact of the open door is active. If both limit contacts
    are active, the state is UNKNOWN. If no limit contact is active, the state is MOVING, and after
    `travel_s` UNKNOWN. If the controller does not report the door's position, the state is UNKNOWN.
@@ -41,6 +43,7 @@ from bridges.kinds.door.memory import (
     rivalled,
     too_long_at,
     travel_ends_at,
+    unwritten_at,
 )
 from bridges.kinds.door.report import DoorReport, report
 from bridges.kinds.door.sensing import BelievedDoor, look, miss, released_by_fire, take
@@ -96,14 +99,17 @@ def _hear(
     match event:
         case Sampled(sample):
             senses = take(memory.senses, sample, now, limits)
-            return replace(memory, senses=senses, io_failure=""), ""
+            return _written(replace(memory, senses=senses)), ""
         case Suspended(reason):
             return replace(memory, senses=DoorSenses(), io_failure=reason), ""
         case WriteFailed(reason):
             senses = replace(memory.senses, linked_since=None)
+            since = now if memory.unwritten_since is None else memory.unwritten_since
+            memory = replace(memory, unwritten_since=since, write_failed=True)
             return replace(memory, senses=senses, io_failure=reason), ""
         case IoFailed(reason):
-            return replace(memory, senses=miss(memory.senses), io_failure=reason), ""
+            senses = miss(memory.senses)
+            return replace(memory, senses=senses, io_failure=reason, unwritten_since=None), ""
         case RivalSeen():
             return replace(memory, rival_at=now), ""
         case Attended(yes):
@@ -113,6 +119,13 @@ def _hear(
         case CloseRequested():
             return _close(memory, now, limits), ""
     return memory, ""  # an operator's reset has no effect: no fault of a door latches
+
+
+def _written(memory: DoorMemory) -> DoorMemory:
+    """Note at a reading that the outputs were written, if no write has failed since the last one."""
+    if memory.write_failed:
+        return replace(memory, write_failed=False)
+    return replace(memory, io_failure="", unwritten_since=None)
 
 
 def _open(memory: DoorMemory, now: float, limits: DoorLimits) -> tuple[DoorMemory, str]:
@@ -192,6 +205,7 @@ def _wakes(
     yield opening_ends_at(memory, limits)
     yield too_long_at(memory, limits)
     yield lost_at(memory, limits)
+    yield unwritten_at(memory, limits)
     if memory.held and limits.pulse is not None:
         phase_s = (now - memory.held_since) % limits.pulse.every_s
         is_on = phase_s < limits.pulse.on_s

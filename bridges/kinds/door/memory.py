@@ -68,7 +68,8 @@ class DoorMemory(msgspec.Struct, frozen=True):
     closed since then. `between_since`: the door has been between its end positions since this time.
     `shut_since`: the door has not been fully open since this time. `rival_at`: the time when another
     node for this door was last heard. `unattended_since`: no node has published requests since this
-    time.
+    time. `unwritten_since`: since this time the door was read, but no write has succeeded.
+    `write_failed`: the last scan's write failed.
     """
 
     latched_at: float | None = None
@@ -82,6 +83,14 @@ class DoorMemory(msgspec.Struct, frozen=True):
     rival_at: float | None = None
     io_failure: str = ""
     unattended_since: float | None = None
+    unwritten_since: float | None = None
+    write_failed: bool = False
+
+
+def unwritten_at(memory: DoorMemory, limits: DoorLimits) -> float:
+    """Return the time when failed writes become a fault; NEVER after a successful write."""
+    since = memory.unwritten_since
+    return NEVER if since is None else since + limits.t.stale_after_s
 
 
 def rivalled(memory: DoorMemory, now: float) -> bool:

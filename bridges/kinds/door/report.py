@@ -12,6 +12,7 @@ from bridges.kinds.door.memory import (
     rivalled,
     too_long_at,
     travel_ends_at,
+    unwritten_at,
 )
 from bridges.kinds.door.sensing import BelievedDoor, released_by_fire
 from bridges.kinds.shared.debounce import RESTLESS_S
@@ -50,18 +51,22 @@ def report(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimit
         faults=tuple(_faults(memory, view, now, limits)),
         hold=memory.held,
         estimated=bool(view.estimated & _PROOFS.get(mode, frozenset())),
-        waits=_waits(memory, view, mode, now),
+        waits=_waits(memory, view, mode, now, limits),
         alarm=AlarmInputs(frozenset({"fire"} if view.fire else ()), view.seen),
     )
 
 
-def _waits(memory: DoorMemory, view: BelievedDoor, mode: DoorModeValue, now: float) -> str:
+def _waits(
+    memory: DoorMemory, view: BelievedDoor, mode: DoorModeValue, now: float, limits: DoorLimits
+) -> str:
     if memory.latched_at is None or mode is DoorModeValue.MODE_OPEN:
         return ""
     if rivalled(memory, now):
         return "until no other node publishes its states"
     if not view.fresh:
         return "for a reading"
+    if now >= unwritten_at(memory, limits):
+        return "for its outputs to be written"
     return "for the door to open" if view.seen else "for its contacts to be steady"
 
 
@@ -74,7 +79,7 @@ _PROOFS = {
 
 
 def _mode(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorModeValue:
-    if rivalled(memory, now) or not view.fresh:
+    if rivalled(memory, now) or not view.fresh or now >= unwritten_at(memory, limits):
         return DoorModeValue.MODE_OFFLINE
     if not view.seen or released_by_fire(view, limits):
         return DoorModeValue.MODE_UNKNOWN
@@ -99,6 +104,8 @@ def _faults(
     if not view.fresh:
         yield from _silence(memory, limits)
     else:
+        if now >= unwritten_at(memory, limits):
+            yield Fault("OUTPUTS_NOT_WRITTEN", memory.io_failure)
         yield from _hazards(memory, view, limits)
         yield from _contradictions(memory, view, now, limits)
     if now >= too_long_at(memory, limits):
@@ -123,7 +130,8 @@ def _silence(memory: DoorMemory, limits: DoorLimits) -> Iterator[Fault]:
 def _hazards(memory: DoorMemory, view: BelievedDoor, limits: DoorLimits) -> Iterator[Fault]:
     if view.fire:
         done = "held open" if limits.on_fire == "open" else "released"
-        yield Fault("FIRE_ALARM", f"the door is {done}")
+        is_so = "is" if memory.unwritten_since is None else "must be"
+        yield Fault("FIRE_ALARM", f"the door {is_so} {done}")
     if memory.closing and memory.held and memory.latched_at is None and view.obstructed:
         yield Fault("DOOR_OBSTRUCTED", "held open after CLOSE while the doorway is not clear")
     if view.errors:

@@ -30,6 +30,7 @@ from tests.kinds.door.virtual import (
     DEBOUNCED,
     OPEN,
     OPENS,
+    STALE_S,
     CoreAlone,
     limits,
 )
@@ -436,6 +437,46 @@ def test_an_estimate_begins_again_after_a_failed_reading() -> None:
         (20.0, "MOVING", True),
         (21.0, "OFFLINE", False),
     ]
+
+
+def test_outputs_that_cannot_be_written_make_the_door_offline_until_a_write_succeeds() -> None:
+    """The relay may be off although the door is open, so no robot may rely on the hold."""
+    core = CoreAlone()
+    core.sees(OPEN, until=1.0)
+    core.hears(OPENS)
+    for half_seconds in range(5):
+        core.now = 1.0 + half_seconds / 2
+        core.hears(Sampled(OPEN))
+        core.hears(WriteFailed("exception 4"))
+    assert core.told[-1] == (2.0, "OFFLINE", True)
+    assert core.faults() == ("OUTPUTS_NOT_WRITTEN: exception 4",)
+    assert core.last is not None
+    assert core.last.report.waits == "for its outputs to be written"
+    core.now = 3.5
+    core.hears(Sampled(OPEN))
+    assert core.faults() == ("OUTPUTS_NOT_WRITTEN: exception 4",)
+    core.now = 4.0
+    core.hears(Sampled(OPEN))
+    assert (core.told[-1], core.faults()) == ((4.0, "OPEN", True), ())
+
+
+def test_the_core_wakes_when_unwritten_outputs_become_a_fault() -> None:
+    core = CoreAlone()
+    core.sees(OPEN, until=1.0)
+    core.hears(WriteFailed("exception 4"))
+    core.now = 1.5
+    assert core.hears(Sampled(OPEN)).wake_at == 1.0 + STALE_S
+    assert core.faults() == ()
+
+
+def test_a_fire_does_not_say_that_a_relay_is_off_that_was_not_written() -> None:
+    core = CoreAlone()
+    core.sees(replace(OPEN, fire=False), until=1.0)
+    core.hears(WriteFailed("exception 4"))
+    core.sees(replace(OPEN, fire=True), until=2.0)
+    assert "FIRE_ALARM: the door is released" in core.faults()
+    core.hears(WriteFailed("exception 4"))
+    assert "FIRE_ALARM: the door must be released" in core.faults()
 
 
 def test_a_failed_write_leaves_the_reading_and_starts_the_estimate_again() -> None:
