@@ -100,7 +100,8 @@ def _take(
             return _sampled(memory, sample, now, limits), ""
         case WriteFailed(reason):
             misses = memory.write_misses + 1
-            return replace(memory, write_misses=misses, write_failed=True, write_fault=reason), ""
+            memory = replace(memory, write_misses=misses, write_failed=True, write_fault=reason)
+            return _unordered(memory), ""
         case IoFailed(reason):
             return replace(memory, misses=memory.misses + 1, io_fault=reason), ""
         case RivalSeen():
@@ -111,6 +112,17 @@ def _take(
             return _request(memory, event, now, limits)
         case _:
             return _cancel(memory, event, now)
+
+
+def _unordered(memory: ChargerMemory) -> ChargerMemory:
+    """Let no later reading prove an order that this scan could not write: to check the range, or to
+    clear errors."""
+    holder, read_at = memory.holder, memory.read_at
+    if read_at is None:
+        return memory
+    if holder and holder.checked_at is not None and holder.checked_at >= read_at:
+        memory = replace(memory, holder=session.unchecked(holder))
+    return replace(memory, clear_by=AGES_AGO) if memory.cleared_at >= read_at else memory
 
 
 # ---- a good reading
@@ -131,7 +143,8 @@ def _sampled(
         write_failed=False,
     )
     if memory.holder:
-        memory = _held(memory, session.follow(memory.holder, sample, now, limits))
+        holder = session.unchecked(memory.holder) if came else memory.holder
+        memory = _held(memory, session.follow(holder, sample, now, limits))
     flows = memory.holder is None and sample.activity in CURRENT_FLOWS
     memory = replace(memory, adopted=flows and (came or memory.adopted))
     memory = _protected(_watched(memory, now), now, limits)

@@ -42,7 +42,8 @@ class ChargeSession(msgspec.Struct, frozen=True):
     """The request to which the station is assigned, and the progress of its charge.
 
     `start_by`: the charge must start by this time (monotonic s). `paused_at`: another robot on the pad
-    has prevented the start since this time. `checked_at`: the time of the last range check. `started`:
+    has prevented the start since this time. `checked_at`: the time of the last range check.
+    `check_is_void`: the robot has left the pad since then, or the order was not written. `started`:
     current has flowed for this request. `failed`: the station reported a fault, so this request gets no
     more power. `ended`: the reason why the request ended. `released_at`: the time at which the robot
     was disconnected.
@@ -52,6 +53,7 @@ class ChargeSession(msgspec.Struct, frozen=True):
     start_by: float
     paused_at: float | None = None
     checked_at: float | None = None
+    check_is_void: bool = False
     started: bool = False
     failed: bool = False
     ended: Literal["", "start timeout", "cancelled", "full", "left"] = ""

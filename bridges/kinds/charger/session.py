@@ -39,6 +39,8 @@ def follow(
     free."""
     on_pad = pad.seen(sample, limits)
     another = on_pad.is_another(holder.request.who)
+    if not on_pad.may_be(holder.request.who):
+        holder = unchecked(holder)
     if sample.activity in AT_FAULT and not (another and sample.side == "robot"):
         return replace(holder, failed=True)
     if another:
@@ -53,6 +55,11 @@ def follow(
         gone = shown_released(holder, now, limits) and not there
         return None if gone and sample.activity is not Activity.RELEASED else holder
     return _pending(holder, sample.activity, on_pad, now)
+
+
+def unchecked(holder: ChargeSession) -> ChargeSession:
+    """Let the last range check prove nothing. The next one comes after RANGE_EVERY_S."""
+    return replace(holder, check_is_void=True)
 
 
 def shown_released(holder: ChargeSession, now: float, limits: ChargerLimits) -> bool:
@@ -118,8 +125,9 @@ def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
         return False
     if sample.measured.in_range is None:
         return True
-    asked = holder.checked_at is not None and memory.read_at > holder.checked_at
-    return asked and sample.measured.in_range
+    if holder.checked_at is None or holder.check_is_void:
+        return False
+    return memory.read_at > holder.checked_at and sample.measured.in_range
 
 
 def range_checked(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
@@ -135,5 +143,5 @@ def range_checked(memory: ChargerMemory, now: float, limits: ChargerLimits) -> C
     asked = holder.checked_at
     if asked is not None and (now - asked < RANGE_EVERY_S or cleared_to_start(memory, limits)):
         return memory
-    holder = replace(holder, checked_at=now)
+    holder = replace(holder, checked_at=now, check_is_void=False)
     return replace(memory, holder=holder, range_checks=memory.range_checks + 1)

@@ -4,6 +4,7 @@ The stories play the situations of a shared charger: scheduled, ad hoc, stacked,
 `test_station_faults.py` has the faults. The stories run in virtual time, with one reading a second.
 """
 
+import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.charger.report import ChargerReport
@@ -16,7 +17,7 @@ from bridges.kinds.charger.signals import (
     ChargerSample,
     Measured,
 )
-from bridges.kinds.shared.decision import Fault, Sampled
+from bridges.kinds.shared.decision import Fault, Sampled, WriteFailed
 from bridges.messages.definitions import ChargerStateValue as State
 from tests.kinds.charger.station import NOBODY, ONE, SERVING, TWO, docked, still_charging, story
 from tests.kinds.charger.story import (
@@ -105,6 +106,39 @@ def test_power_waits_for_a_check_of_the_range_that_the_core_has_ordered() -> Non
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
     it.sees((A.IDLE, ONE, 1), in_range=True)
     assert it.outputs == ChargerOutputs(power=True, range_checks=1)
+
+
+@pytest.mark.parametrize("there", [NOBODY, TWO])
+def test_a_robot_that_comes_back_to_the_pad_needs_a_new_check_of_the_range(there: str) -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 2), in_range=True)
+    assert it.outputs == ChargerOutputs(power=True, range_checks=1)
+    it.sees((A.IDLE, there, 1), in_range=True).sees((A.IDLE, ONE, 1), in_range=True)
+    assert it.outputs == ChargerOutputs(power=False, range_checks=1)
+    it.sees((A.IDLE, ONE, 3), in_range=True)  # 5 s after the last check
+    assert it.outputs == ChargerOutputs(power=True, range_checks=2)
+
+
+def test_after_a_silence_of_the_station_the_range_is_checked_again() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 2), in_range=True).polls("silent 4")
+    it.sees((A.IDLE, ONE, 1), in_range=True)
+    assert it.outputs == ChargerOutputs(power=False, range_checks=2)
+
+
+def test_a_check_of_the_range_that_was_not_written_proves_nothing() -> None:
+    it = story().event(AMR1).sees((A.IDLE, ONE, 1), in_range=True)
+    it.event(WriteFailed("no reply")).sees((A.IDLE, ONE, 4), in_range=True)
+    assert it.outputs == ChargerOutputs(power=False, range_checks=1)
+    it.sees((A.IDLE, ONE, 2), in_range=True)
+    assert it.outputs == ChargerOutputs(power=True, range_checks=2)
+
+
+def test_errors_whose_clearing_was_not_written_stay_until_the_next_reset() -> None:
+    fan = Sampled(ChargerSample(A.ERROR, 9, "fan", side="station"))
+    it = story().event(fan).event(RESET).event(WriteFailed("no reply"))
+    it.sees((A.IDLE, NOBODY, 3))
+    assert it.told[-1][1:] == ("ERROR", "out of service after: station: fan")
+    it.event(RESET).sees((A.IDLE, NOBODY, 1))
+    assert it.told[-1][1] == "IDLE"
 
 
 def test_the_range_is_checked_every_five_seconds_until_the_start_timeout() -> None:
