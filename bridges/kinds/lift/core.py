@@ -51,7 +51,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift import drive, forgotten, sensing, sessions
 from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
-from bridges.kinds.lift.report import NOT_FRESH, LiftReport, report
+from bridges.kinds.lift.report import NOT_FRESH, NOT_KEPT, LiftReport, report
 from bridges.kinds.lift.sensing import HAZARDS, BelievedLift, gap, look, take, trust, unsure
 from bridges.kinds.lift.signals import (
     Event,
@@ -275,7 +275,7 @@ def _faults(
         found.append(Fault("ROBOT_LEFT_IN_CAR", f"{memory.grace.session.id} was ended in mid-ride"))
     if memory.not_kept and limits.fire_reset == "manual":
         told = "a restart would not know whether the lift waits for a reset after a fire"
-        found.append(Fault("NOT_KEPT", f"{told}: {memory.not_kept}"))
+        found.append(Fault(NOT_KEPT, f"{told}: {memory.not_kept}"))
     return (*found, *view.faults)
 
 

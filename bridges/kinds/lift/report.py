@@ -12,6 +12,7 @@ from bridges.kinds.shared.decision import AlarmInputs, Fault
 from bridges.messages.definitions import LiftDoor, LiftMode, LiftMotion
 
 NOT_FRESH = "INPUTS_NOT_FRESH"
+NOT_KEPT = "NOT_KEPT"
 OFFLINE = frozenset({"OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
 """Faults that show the lift as OFFLINE. Without fresh inputs the lift is OFFLINE too."""
 
@@ -142,7 +143,7 @@ def _may_enter(
       obstacle is present, if AGV mode has failed, or after the last try, the door is shown as it is,
       because no other way leads out.
     - Before a robot has boarded, OPEN is shown only if the lift serves the session in AGV mode, without
-      a fault. The fault FORGOTTEN_BY_SUPERVISOR does not matter.
+      a fault. The faults FORGOTTEN_BY_SUPERVISOR and NOT_KEPT (a full disk) do not matter.
     """
     session, held = memory.session, memory.relays.hold.on is not None
     if wanted.hold_door is not None and not held:
@@ -154,7 +155,7 @@ def _may_enter(
         return False
     if drive.holds_later(session) and mode in (LiftMode.MODE_AGV, LiftMode.MODE_HUMAN):
         return False
-    hinders = any(fault.code != forgotten.CODE for fault in faults)
+    hinders = any(fault.code not in (forgotten.CODE, NOT_KEPT) for fault in faults)
     return session.boarded or (served and not hinders)
 
 

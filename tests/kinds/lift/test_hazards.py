@@ -437,6 +437,19 @@ def test_a_full_disk_delays_no_output_and_is_a_fault_only_where_a_latch_matters(
     assert story.faults == []
 
 
+def test_a_full_disk_lets_robots_board() -> None:
+    story = Story(Controller(), fire_reset="manual")
+    story.building.hazard(Hazard.FIRE)
+    story.run(2.0)
+    story.building.hazard()
+    story.run(4.0)
+    story.disk.full = True
+    story.resets()
+    story.asks("A", "L1")
+    story.until(lambda: story.state == "AGV, open at L1, A to L1")
+    assert story.faults == ["NOT_KEPT"]
+
+
 def test_the_outputs_are_off_and_the_fleets_told_before_the_latch_is_written() -> None:
     """A write to a worn card may take seconds."""
 
