@@ -173,11 +173,13 @@ def _with(
 
 def _end(memory: SupervisedLift, ended: RideEnded, now: float) -> SupervisedLift:
     """Remove the session from the queue. If the session has the lift, or has its turn, send END to the
-    lift's node."""
+    lift's node. A person's END takes the place of another END of that session."""
     session = ended.session
     memory, turn = _without(memory, session), memory.turn
     has_it = session in (memory.session_shown, turn.session if turn else "")
-    if not has_it or not memory.may_speak or (turn and turn.ends):
+    if not has_it or not memory.may_speak:
+        return memory
+    if turn and turn.ends and (turn.by_person or not ended.by_person or turn.session != session):
         return memory
     return _begin(memory, Turn(session, now, ends=True, by_person=ended.by_person))
 

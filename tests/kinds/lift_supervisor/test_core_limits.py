@@ -146,6 +146,20 @@ def test_the_lifts_node_is_told_that_a_person_has_ended_the_session() -> None:
     assert (door(by_person=True), door(by_person=False)) == (2, 0)
 
 
+def test_a_person_ends_a_session_whose_end_the_lift_does_not_obey() -> None:
+    """The lift keeps a robot in the car that goes on asking. Only a person's END ends that session."""
+    desk = Alone()
+    desk.asks("a")
+    desk.ride("a")
+    desk.until(1.0)
+    for by_person, door in ((False, 0), (True, 2), (False, 2)):
+        desk.until(desk.now + 1.0)
+        desk.hears(RideEnded("a", desk.stamped(0.0), -desk.skew, by_person=by_person))
+        end = core.wanted(desk.memory)
+        assert end is not None
+        assert end.door_state == door
+
+
 def test_beside_another_supervisor_ours_is_silent_and_afterwards_follows_the_shown_state() -> None:
     desk = Alone()
     desk.asks("a")
