@@ -98,7 +98,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._refusals = Refusals()
         self._answers = RefusalAnswers()
         self._keeper = Keeper(kind, kept, self._publish)
-        self._started_at = clock.monotonic()
+        self._knows_since = started_at = clock.monotonic()
         self._orders: deque[OperatorReset | E] = deque()
         self._may = MaySpeak(False, alone=self.alone is None)
         self._hears: dict[str, Subscription] = {}
@@ -106,8 +106,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._shown: set[str] = set()
         self._reserved = frozenset(kind.reserved(settings))
         self._requesters = 0
-        self._forget_at = self._started_at
-        for name, memory in self._keeper.restore(settings, self._started_at).items():
+        self._forget_at = started_at
+        for name, memory in self._keeper.restore(settings, started_at).items():
             self._add(name, memory)
 
     def subscribe(self) -> None:
@@ -275,6 +275,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             if self._kind.idle(subject.memory, now):
                 self._requesters -= self._remembered(subject)
                 del self.subjects[subject.name]
+                self._knows_since = now
                 self._writer.forgotten(subject.name, now)
                 self._shown.discard(subject.name)
 
@@ -292,7 +293,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         if shows_itself:
             self._shown.add(name)
         found = self.subjects.get(name)
-        return found or self._add(name, self._kind.initial(name, self._started_at))
+        return found or self._add(name, self._kind.initial(name, self._knows_since))
 
     def _has_room(self, name: str, shows_itself: bool) -> bool:
         """Return whether this name can be added. The limits keep room for the names in the YAML and for

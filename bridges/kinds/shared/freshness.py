@@ -7,11 +7,12 @@ Rules:
 FRESHNESS-1. A request counts if its stamp is newer than the stamps of all requests of the same
    requester that counted before. An END is compared only with earlier ENDs. The reason is that an
    operator may end a robot's session, and the operator's clock may differ.
-FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter
-   to each new subscriber. The replay comes again when an adapter's network comes back. On such a topic
-   an equal stamp is a replay. A requester's first request counts only if it was sent after our own
-   start. Later requests are compared only with the requester's own stamps. If the YAML sets
-   `clock_synchronised`, the age of every request is judged too.
+FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every
+   adapter to each new subscriber. The replay comes again when an adapter's network comes back. On
+   such a topic an equal stamp is a replay. A requester's first request counts only if it was sent
+   after our own start, and after we last forgot a lift with its requesters. Later requests are
+   compared only with the requester's own stamps. If the YAML sets `clock_synchronised`, the age of
+   every request is judged too.
 FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old request was delayed or
    arrived twice. On such a topic an equal stamp counts, because a requester without a clock always
    sends 0. A requester's first request counts. A requester that holds no door is forgotten after a

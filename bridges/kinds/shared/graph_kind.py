@@ -70,7 +70,8 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
       of the site must define each of these devices.
 
     The core:
-    - `initial(subject, started_at)`: a subject's memory. `started_at` is the daemon's start.
+    - `initial(subject, started_at)`: a new subject's memory. `started_at` is the daemon's start, or the
+      time at which the node last forgot a subject. A request from before that may be old.
     - `decide`: the core. Its messages have no stamps.
     - `stamped(message, time)`: the message with its stamp, when the node sends it.
     - `summary(report, now)`: keys and values for the status file and `watch`.

@@ -29,6 +29,31 @@ A, B, C = "fleet/a", "fleet/b", "fleet/c"
 UP, DOWN = ("L1", "L3"), ("L3", "L1")
 
 
+@pytest.mark.parametrize("away_s", [50.0, 75.0])
+def test_rides_that_are_over_move_nothing_when_the_supervisors_network_comes_back(
+    away_s: float,
+) -> None:
+    """After 60 s the supervisor has forgotten the lift. Then the adapter's retained requests come."""
+    away = [False]
+
+    def route(sender: str, receiver: str) -> Sequence[float]:
+        return () if away[0] and "supervisor" in (sender, receiver) else (0.01,)
+
+    world = World(route)
+    supervisor, _ = OurSupervisor(world), LiftNode(world)
+    rider = Rider(world, A, UP, DOWN)
+    world.run(300.0, lambda: rider.done)
+    world.run(world.now + 10.0)
+    before = requests(world)
+    away[0] = True
+    world.run(world.now + away_s)
+    away[0] = False
+    world.replay("supervisor")
+    world.run(world.now + 20.0)
+    assert requests(world) == before
+    assert supervisor.node.refused != {}
+
+
 def adapters_first(sender: str, receiver: str) -> Sequence[float]:
     return (0.02,) if receiver == "supervisor" else (0.01,)
 
