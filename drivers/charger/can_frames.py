@@ -300,12 +300,16 @@ def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
         low, high = frames.bounds(*signal.split("."))
         return low <= values[signal] <= high
 
+    def flag(signal: str | None) -> bool | None:
+        """Is the signal valid and not 0? Return None if the map has no such signal."""
+        return None if signal is None else bool(values[signal]) and is_valid(signal)
+
     out = values.get(found.out_of_range or "")
     return Measured(
         receiver_id=receiver_text(values.get(found.receiver or "")),
         in_range=None if out is None else not out,
-        range_ok=_flag(values, found.range_ok),
-        at_height=_flag(values, found.at_height),
+        range_ok=flag(found.range_ok),
+        at_height=flag(found.at_height),
         volts=_rounded(values.get(found.volts or "")),
         amps=_rounded(values.get(found.amps or "")),
         temperatures=tuple(
@@ -353,11 +357,6 @@ def _heard(values: Values, signal: str) -> float:
     if signal not in values:
         raise DriverError(f"no frame with {signal} has come, but a rule of the map needs its value")
     return values[signal]
-
-
-def _flag(values: Values, signal: str | None) -> bool | None:
-    """Return the signal as a boolean. Return None if the map has no such signal."""
-    return None if signal is None else bool(values[signal])
 
 
 def _rounded(value: float | None) -> float | None:

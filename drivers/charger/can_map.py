@@ -168,7 +168,11 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             return
         for path, signal in self.signals():
             frame, _, name = signal.partition(".")
-            yield from _lacks(found, path, frame, name or "?")
+            lacks = list(_lacks(found, path, frame, name or "?"))
+            yield from lacks
+            if not lacks and found.is_paged(frame, name):
+                text = "is multiplexed: an error would vanish with the next frame; write a driver"
+                yield path, f"{signal} {text}"
         for path, text in by_rules.problems(self.rules, self.state is not None):
             yield (path, text) if path != ("codes",) else (("state",), STATE_IS_NEEDED)
         for name in self.masks:

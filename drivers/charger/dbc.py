@@ -45,6 +45,11 @@ class Dbc:
         """Return the names of a frame's signals."""
         return [signal.name for signal in self._messages[frame].signals]
 
+    def is_paged(self, frame: str, signal: str) -> bool:
+        """Return whether only some of these frames have the signal (it is multiplexed)."""
+        found = self._messages[frame].get_signal_by_name(signal)
+        return found.multiplexer_ids is not None
+
     def id(self, frame: str) -> int:
         """Return a frame's id. If the id has 29 bits, EXTENDED is set."""
         message = self._messages[frame]

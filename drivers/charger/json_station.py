@@ -220,7 +220,11 @@ class JsonCharger:
         """Do nothing, because a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
-        """Read and decode the station's state. Raises DriverError for an answer that makes no sense."""
+        """Read and decode the station's state. Raises DriverError for an answer that makes no sense.
+
+        After a failed reading the station may charge or not. Then `stop` is sent once, and no `start`.
+        """
+        self._activity, self._at_fault = Activity.UNKNOWN, True
         answer = self._station.answer()
         fields = self._settings.fields
         has_codes = self._settings.codes is not None

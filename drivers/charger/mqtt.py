@@ -16,6 +16,7 @@ from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.spelling import unknown
 from drivers.charger import json_station, rules
+from drivers.charger.http_fields import Fields
 from drivers.charger.json_station import POWER, JsonCharger, JsonChargerSettings, StationCommand
 from drivers.driver_type import DriverType
 from drivers.hal.mqtt import MqttBus, MqttSettings
@@ -77,12 +78,17 @@ class MqttChargerSettings(
 
 
 def _fields(settings: MqttChargerSettings) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield each field that the driver reads, with its path in the YAML."""
+    """Yield each field that the driver reads, with its path in the YAML. With the default of
+    `error_text` the station has no such text."""
     for name in settings.fields.__struct_fields__:
         place = getattr(settings.fields, name)
         if isinstance(place, JsonFlag | JsonNumber):
             yield ("fields", name), place.field
-        elif (name == "receiver_id" and place) or (name == "state" and settings.codes):
+        elif (
+            (name == "error_text" and place != Fields().error_text)
+            or (name == "receiver_id" and place)
+            or (name == "state" and settings.codes)
+        ):
             yield ("fields", name), place
     for name, number in settings.fields.temperatures.items():
         yield ("fields", "temperatures", name), number.field

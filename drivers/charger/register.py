@@ -67,7 +67,7 @@ def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
 def cells(settings: RegisterChargerSettings) -> dict[str, list[Point]]:
     """Return, for each value, its registers, or its coil or discrete input."""
     found: Mapping[str, RegisterNumber] = charger_map(settings).values
-    return {name: [at(settings.unit, p) for p in n.places()] for name, n in found.items()}
+    return {name: number.points(settings.unit) for name, number in found.items()}
 
 
 def orders(settings: RegisterChargerSettings) -> dict[str, Point]:

@@ -13,7 +13,8 @@ from drivers.charger import rules as by_rules
 from drivers.charger.rules import Rule, StationErrors
 from drivers.charger.state_codes import Codes
 from drivers.hal.modbus.map_parts import Placed, WrittenLevels, WrittenPlace
-from drivers.hal.modbus.registers import Word, place
+from drivers.hal.modbus.points import Point
+from drivers.hal.modbus.registers import REGISTERS, Word, at, misplaced, place
 from drivers.numbers import BITS, LongBit
 from drivers.profiles import Profile
 
@@ -49,11 +50,12 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("bit",), f"{have} bits 0 to {BITS * self.words - 1}"
         if self.low_first and self.words == 1:
             yield ("low_first",), "is for two registers: write words: 2"
+        if misplaced(self.at, REGISTERS) is None and place(self.at)[1] + self.words > 65536:
+            yield ("words",), "there is no register after 65535"
 
-    def places(self) -> list[str]:
-        """Return the addresses of the registers that hold this number, the high word first."""
-        table, address = place(self.at)
-        found = [f"{table} {address + n}" for n in range(self.words)]
+    def points(self, unit: int) -> list[Point]:
+        """Return the unit's registers that hold this number, the high word first."""
+        found = [at(unit, self.at, n) for n in range(self.words)]
         return found[::-1] if self.low_first else found
 
     def value(self, words: list[int]) -> float:

@@ -130,8 +130,8 @@ class HttpWorkcell:
         self._on = False
 
     def open(self) -> None:
-        """Check that the controller answers."""
-        self._bus.get_json(self._settings.state_path)
+        """Do nothing, because a restart must not end a cycle. The first reading shows whether the
+        controller answers."""
 
     def read(self) -> WorkcellSample:
         """Read every input now. Raises DriverError."""

@@ -23,6 +23,7 @@ from drivers import DriverError, json_fields
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
 from drivers.hal import http
+from drivers.hal.every import Every
 from drivers.http_call import Call, InsistentCalls, claim, described, send, timer_unseen
 from drivers.json_fields import JsonFlag
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted
@@ -167,14 +168,19 @@ class HttpDoor:
         self._touched = False
 
     def open(self) -> None:
-        """Check that the controller answers. At the first call, release the door too.
+        """Check that the controller answers. Until the first success, release the door too, even if its
+        state cannot be read.
 
-        After a failure `open` only reads, and sends no release. A lost answer must not release a door
-        that RMF still holds.
+        After that `open` only reads, and sends no release. A lost answer must not release a door that
+        RMF still holds.
         """
-        held = self._held(self._bus.get_json(self._settings.state_path))
+        held, every = None, Every()
+        with every.one():
+            held = self._held(self._bus.get_json(self._settings.state_path))
         if not self._claimed and held is not False:
-            self._send(on=False)
+            with every.one():
+                self._send(on=False)
+        every.check()
         self._claimed = True
 
     def read(self) -> DoorSample:

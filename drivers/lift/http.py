@@ -6,7 +6,8 @@ request `ask`, which switches such a command on, also starts the command's timer
 car is one request, as when a person presses a button once.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Annotated, Protocol
 
 from bridges.kinds.lift.settings import LiftSettings
@@ -17,6 +18,7 @@ from bridges.kinds.shared.table import Table
 from drivers import DriverError, json_fields
 from drivers.driver_type import DriverType
 from drivers.hal import http
+from drivers.hal.every import Every
 from drivers.http_call import InsistentCalls, claim, described, send, timer_unseen
 from drivers.json_fields import JsonFlag, JsonNumber
 from drivers.lift import checks
@@ -244,19 +246,24 @@ class HttpLift:
         self._told: dict[Held, bool] = {}
         self._called: str | None = None
         self._sure = False
-        self._failed: Held | None = None
+        self._failed = ""
         self._claimed = self._touched = False
 
     def open(self) -> None:
-        """Check that the gateway answers. At the first call, also switch off every command that the
-        state does not show as off.
+        """Check that the gateway answers. Until the first success, also switch off every command that
+        the state does not show as off, even if the state cannot be read.
 
-        After a failure `open` only reads. A lost answer must not end a robot's ride.
+        After that `open` only reads. A lost answer must not end a robot's ride.
         """
-        answer = self._answer()
+        on, every = [*self._held], Every()
+        with every.one():
+            answer = self._answer()
+            on = [name for name in on if self._shown(name, answer) is not False]
         if not self._claimed:
             self._told = dict.fromkeys(self._held, False)
-            self._off([name for name in self._held if self._shown(name, answer) is not False])
+            with every.one():
+                self._off(on)
+        every.check()
         self._claimed = True
 
     def read(self) -> LiftSample:
@@ -269,16 +276,22 @@ class HttpLift:
         return sample
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every command to its level in `outputs`. Commands that go off come first. Renew the
-        commands that have a timer."""
+        """Set every command to its level in `outputs`. Commands that go off come first, each even if
+        another one fails; then nothing goes on. Renew the commands that have a timer."""
         wanted = {name: _wants(outputs, name) for name in self._held}
         idle = [name for name in wanted if not wanted[name] and self._told.get(name) is not False]
-        for name in sorted(idle, key=lambda name: name == self._failed):
-            self._failed = name  # if this fails, the next attempt begins with another command
-            self._switch(name, on=False)
-        self._failed = None
+        offs: dict[str, Callable[[], None]]
+        offs = {name: partial(self._switch, name, on=False) for name in idle}
         if self._called not in (None, outputs.call):
-            self._withdraw()
+            offs["call"] = self._withdraw
+        every, failed = Every(), self._failed
+        self._failed = ""
+        for name in sorted(offs, key=lambda name: name == failed):
+            with every.one():
+                offs[name]()
+            if every.failure is not None:  # the next attempt begins with another one
+                self._failed = self._failed or name
+        every.check()
         for name in (n for n in HELD if wanted.get(n)):
             if self._held[name].is_renewed() or not self._told.get(name):
                 self._switch(name, on=True)

@@ -85,8 +85,8 @@ def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutpu
 def paced(
     settings: ModbusSettings, devices: Sequence[DeviceSettings], points: Iterable[str]
 ) -> Remarks:
-    """Yield a warning if one silent unit makes the other units' readings stale. Yield a warning if a
-    serial line is too slow for its `scan_s`."""
+    """Yield a warning if one silent unit makes the other units' readings stale, or lets a module's
+    watchdog switch off. Yield a warning if a serial line is too slow for its `scan_s`."""
     units = {int(point.split()[1]) for point in points}
     units |= {device.unit for device in devices if hasattr(device, "unit")}
     stale_s = min((s for d in devices if (s := d.stale_after()) is not None), default=math.inf)
@@ -99,6 +99,16 @@ def paced(
                 f" but readings are stale after {stale_s:g} s: lower timeout_s or retries"
             ),
         )
+    watchdog = settings.module_watchdog
+    habits = watchdog.chosen() if watchdog and not any(watchdog.problems()) else None
+    if len(units) > 1 and habits:
+        unseen_s = silent_s + settings.scan_s + habits.refresh_s
+        if unseen_s >= habits.time_s:
+            yield (
+                ("timeout_s",),
+                f"beside one silent unit a watchdog gets no refresh for {unseen_s:g} s, and after"
+                f" {habits.time_s:g} s it switches its outputs off: lower timeout_s or retries",
+            )
     line = settings.serial
     if line and (round_s := len(units) * line.least_s) > settings.scan_s:
         text = f"to read every unit once takes {round_s:.2g} s at {line.baudrate} baud"

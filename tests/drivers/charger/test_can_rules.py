@@ -12,10 +12,12 @@ import msgspec
 import pytest
 
 from bridges.kinds.charger.signals import Activity
+from drivers.charger import dbc
 from drivers.charger.can_frames import (
     FrameChargerSettings,
     FrameDriver,
     create,
+    decode,
     describe,
     frame_tables,
 )
@@ -128,6 +130,59 @@ def test_check_tells_rules_numbers_and_bits() -> None:
         ("00 00 00 00 00 00 08 00", "Flags 8: robot's error, battery"),
         ("00 00 00 00 01 00 00 00", "Relay 1"),
     ]
+
+
+PADS = """VERSION ""
+
+NS_ :
+
+BS_:
+
+BU_: Bridge Charger
+
+BO_ 256 State: 2 Charger
+ SG_ Mode : 0|8@1+ (1,0) [0|255] "" Bridge
+ SG_ InRange : 8|2@1+ (1,0) [0|1] "" Bridge
+ SG_ AtHeight : 10|2@1+ (1,0) [0|3] "" Bridge
+
+BO_ 257 Diag: 2 Charger
+ SG_ Page M : 0|8@1+ (1,0) [0|255] "" Bridge
+ SG_ Foreign m0 : 8|8@1+ (1,0) [0|255] "" Bridge
+ SG_ Heat m1 : 8|8@1+ (1,0) [0|255] "" Bridge
+"""
+
+
+def pads(folder: Path, **more: Any) -> FrameMap:
+    """Return a map with range and height, and these keys."""
+    (folder / "pads.dbc").write_text(PADS)
+    state = {"at": "State.Mode", "codes": {"idle": [0], "charging": [1]}}
+    plain = {"dbc": str(folder / "pads.dbc"), "state_timeout_s": 1, "state": state, **more}
+    send = [{"frame": "State", "every_s": 0.5, "on": {"Mode": 1}, "off": {"Mode": 0}}]
+    return msgspec.convert({**plain, "send": send}, FrameMap)
+
+
+def test_a_signal_that_only_some_frames_have_is_refused(tmp_path: Path) -> None:
+    found = pads(
+        tmp_path,
+        amps="Diag.Page",
+        errors={"station": {"Diag.Foreign": "foreign object"}},
+        temperatures={"coil": "Diag.Heat"},
+    )
+    assert [(path, text.split(":")[0]) for path, text in found.problems()] == [
+        (("temperatures", "coil"), "Diag.Heat is multiplexed"),
+        (("errors", "station", "Diag.Foreign"), "Diag.Foreign is multiplexed"),
+    ]
+
+
+@pytest.mark.parametrize(("value", "ok"), [(0, False), (1, True), (2, False), (3, False)])
+def test_a_range_or_height_outside_the_dbcs_bounds_gives_no_power(
+    tmp_path: Path, value: int, ok: bool
+) -> None:
+    """In two bits, 2 commonly means an error, and 3 not available."""
+    found = pads(tmp_path, range_ok="State.InRange", at_height="State.AtHeight")
+    values = {"State.Mode": 0, "State.InRange": value, "State.AtHeight": value}
+    measured = decode(found, dbc.load(found.dbc), values).measured
+    assert (measured.range_ok, measured.at_height) == (ok, value > 0)
 
 
 def test_a_map_must_say_in_some_way_what_the_state_is() -> None:

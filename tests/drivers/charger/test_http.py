@@ -29,6 +29,7 @@ from tests.depth import examples
 
 CODES = Codes(idle=[0], handshake=[1, 2], charging=[5], stopping=[11], released=[7], error=[238])
 SETTINGS = HttpChargerSettings(codes=CODES)
+SWITCHED = HttpChargerSettings(codes=CODES, start=Call(path="/start"), stop=Call(path="/stop"))
 EXAMPLE = Path(__file__).parents[3] / "config" / "charger_http.yaml"
 
 
@@ -54,6 +55,20 @@ class Station:
 
 def read(answer: Any) -> ChargerSample:
     return create("a", SETTINGS, Station(answer)).read()
+
+
+def test_after_a_failed_reading_stop_is_sent_once_and_no_start() -> None:
+    """The last reading showed `idle`, but the station may have begun to charge."""
+    station = Station({"state": 0, "error_msg": ""})
+    charger = create("a", SWITCHED, station)
+    charger.read()
+    charger.write(ChargerOutputs(power=True))
+    station.answer = {}
+    for power in (True, True, False, False):
+        with pytest.raises(DriverError):
+            charger.read()
+        charger.write(ChargerOutputs(power=power))
+    assert [call for call in station.calls if "GET" not in call] == ["POST /start", "POST /stop"]
 
 
 def test_the_driver_stands_on_http_and_has_no_wires() -> None:

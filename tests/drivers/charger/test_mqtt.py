@@ -133,6 +133,12 @@ def test_every_failure_is_a_driver_error(pad: Pad, part: str, mode: FailureMode)
         ),
         ("topic: tpu/b/fault ", "topic: tpu/b/status ", "is the topic of fault too"),
         (
+            "error_text: fault",
+            "error_text: fualt",
+            "fualt must begin with the name of a topic in topics: unknown topic 'fualt':"
+            " did you mean 'fault'? known here: status, fault",
+        ),
+        (
             "stop: {topic: tpu/b/set,",
             "stop: {topic: tpu/b/status,",
             "tpu/b/status is a state topic: the daemon would read the command as a state",

@@ -45,7 +45,21 @@ def test_words_are_read_and_written_alike(
 
 def test_the_low_word_may_be_the_first_of_two() -> None:
     number = RegisterNumber(at="holding register 8", words=2, low_first=True)
-    assert number.places() == ["holding register 9", "holding register 8"]
+    found = [str(point) for point in number.points(3)]
+    assert found == ["unit 3 holding register 9", "unit 3 holding register 8"]
+
+
+@pytest.mark.parametrize("at", ["input register 0x7531", "holding register 0x9C40"])
+def test_an_address_that_looks_like_a_number_of_the_data_model_is_written_in_hex(at: str) -> None:
+    number = RegisterNumber(at=at, words=2)
+    assert list(number.problems()) == []
+    assert [point.address for point in number.points(1)] == [int(at[-4:], 16), int(at[-4:], 16) + 1]
+
+
+def test_no_number_reaches_beyond_the_last_register() -> None:
+    problem = (("words",), "there is no register after 65535")
+    assert list(RegisterNumber(at="input register 0xFFFF", words=2).problems()) == [problem]
+    assert list(RegisterNumber(at="input register 0xFFFF").problems()) == []
 
 
 def read(**values: float) -> tuple[Activity, int | str, str, str]:

@@ -126,6 +126,20 @@ def test_a_hold_is_renewed_in_each_scan_and_a_release_is_sent_once() -> None:
     assert relay.calls == [OFF, ON, ON, ON, OFF]
 
 
+def test_a_start_releases_a_door_whose_state_cannot_be_read_and_later_one_does_not() -> None:
+    relay = Relay(held=None)
+    door = create("door", SETTINGS, relay)
+    for _ in range(2):
+        with pytest.raises(DriverError):
+            door.open()
+    relay.held = False
+    door.open()
+    relay.held = None
+    with pytest.raises(DriverError):
+        door.open()
+    assert relay.calls == [OFF, OFF]
+
+
 def test_a_release_that_was_not_obeyed_or_heard_is_sent_again() -> None:
     relay = Relay(held=True)
     door = create("door", SETTINGS, relay)

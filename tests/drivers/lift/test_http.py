@@ -341,10 +341,61 @@ def test_an_off_that_fails_keeps_no_other_off_waiting() -> None:
         with pytest.raises(DriverError, match="/agv/off is refused"):
             lift.write(OFF)
     assert gateway.sent == ["/agv/off", "/door/off", "/agv/off"]
+    gateway.broken = set()
+    lift.write(msgspec.structs.replace(HOLD, call="L2"))
     gateway.sent.clear()
+    gateway.broken = {"/agv/off", "/door/off"}
+    with pytest.raises(DriverError, match="/agv/off is refused"):
+        lift.write(OFF)
+    assert gateway.sent == ["/agv/off", "/door/off", "/call/none"]
+    gateway.broken = {"/agv/off"}
+    gateway.sent.clear()
+    gateway.insisted = 0
     with pytest.raises(DriverError, match="/agv/off is refused"):
         lift.make_safe()
     assert (gateway.sent, gateway.insisted) == (["/call/none", "/agv/off", "/door/off"], 1)
+
+
+def test_an_off_that_hangs_does_not_come_first_again() -> None:
+    """After a hanging call the bus refuses the others for a while."""
+
+    class Hanging(Gateway):
+        hangs = False
+
+        def send(self, path: str, *how: Any, **more: Any) -> None:
+            if self.hangs:
+                raise HalError("waits before the next attempt")
+            self.hangs = path in self.broken
+            super().send(path, *how, **more)
+
+    gateway = Hanging(out={})
+    settings = settings_of(commands={**COMMANDS, "agv_mode_request": timed("/agv")})
+    lift = create("lift", settings, gateway)
+    lift.open()
+    lift.write(msgspec.structs.replace(HOLD, call="L2"))
+    gateway.broken = {"/agv/off"}
+    gateway.sent.clear()
+    for _ in range(2):
+        gateway.hangs = False
+        with pytest.raises(DriverError):
+            lift.write(OFF)
+    assert gateway.sent == ["/agv/off", "/door/off", "/call/none", "/agv/off"]
+
+
+def test_a_start_switches_off_what_it_can_although_the_state_cannot_be_read() -> None:
+    gateway = Gateway(out={})
+    lift = create("lift", settings_of(), gateway)
+    for _ in range(2):
+        with pytest.raises(DriverError, match=r"out\.agv"):
+            lift.open()
+    assert gateway.sent == ["/call/none", "/agv/off", "/door/off"] * 2
+    gateway.answer = GOOD
+    lift.open()
+    gateway.sent.clear()
+    gateway.answer = {}
+    with pytest.raises(DriverError):
+        lift.open()
+    assert gateway.sent == []
 
 
 def test_off_is_sent_although_the_state_cannot_be_read() -> None:

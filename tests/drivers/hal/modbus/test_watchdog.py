@@ -20,6 +20,7 @@ from drivers import DriverError
 from drivers.door.dry_contact import create, wires
 from drivers.hal import modbus
 from drivers.hal.modbus.points import Point
+from drivers.hal.modbus.settings import paced
 from drivers.hal.modbus.watchdog import PROFILE
 from hal_fakes.caller import Caller
 from hal_fakes.modbus import ModbusServer
@@ -54,6 +55,23 @@ def habits(time: int) -> dict[str, Any]:
     plain["arm"][0]["value"] = time
     plain["armed"][0]["values"] = [time]
     return {**plain, "time_s": time / 10, "refresh_s": time / 20}
+
+
+@pytest.mark.parametrize(("time", "warned"), [(20, True), (100, False)])
+def test_check_warns_if_a_silent_unit_lets_another_units_watchdog_switch_off(
+    time: int, warned: bool
+) -> None:
+    plain = {
+        "tcp": {"host": "192.0.2.1"},
+        "timeout_s": 0.5,
+        "retries": 1,
+        "module_watchdog": {"units": [1], "habits": habits(time)},
+    }
+    settings = msgspec.convert(plain, modbus.ModbusSettings)
+    two, one = (("unit 1 coil 0", "unit 2 coil 0"), ("unit 1 coil 0",))
+    found = [text for _, text in paced(settings, [], two)]
+    assert any("a watchdog gets no refresh for 2." in text for text in found) is warned
+    assert list(paced(settings, [], one)) == []
 
 
 class Site:
