@@ -121,8 +121,12 @@ class FleetAlarmNode(
             self._add(ALARM, fleet_alarm.initial())
 
     def tell(self, device: str, inputs: AlarmInputs) -> None:
-        """Note the causes for an alarm that a device sees now. Any thread may call this method."""
-        self.inbox.put(ALARM, (self._limits.topic, DeviceTells(device, inputs)), device)
+        """Note the causes for an alarm that a device sees now. Any thread may call this method.
+
+        A short alarm that comes and goes before the next round stays in the inbox, because it latches.
+        """
+        tells = DeviceTells(device, inputs)
+        self.inbox.put(ALARM, (self._limits.topic, tells), tells)
 
     def subscribe(self) -> None:
         """Subscribe to other nodes' statements, and to their alarms on each topic that RMF's release

@@ -102,6 +102,18 @@ def test_a_fire_in_the_quiet_start_is_published_at_once() -> None:
     assert site.late() == [True]
 
 
+def test_an_alarm_that_comes_and_goes_while_the_node_is_busy_latches() -> None:
+    """The node waits for a slow disk. A key switch may be on for only a second."""
+    site = Site()
+    site.start("a")
+    for inputs in (FIRE, CLEAR):
+        site.nodes["a"].tell("Panel", inputs)
+    site.rounds()
+    assert site.heard == [d.Bool(True)]
+    site.until(20.0)
+    assert site.state("a").startswith("alarm")
+
+
 def test_two_daemons_are_one_alarm_that_outlives_both_of_them() -> None:
     site = Site()
     site.start("a")
