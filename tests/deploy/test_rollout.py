@@ -15,6 +15,7 @@ from typing import Any, Final
 import pytest
 import yaml
 
+from bridges import cli
 from bridges.kinds import kind_names
 from bridges.settings.load import load
 from workbench.commissioning.doctor.finding import ok
@@ -130,20 +131,63 @@ def test_every_kind_has_a_role_and_needs_a_kill_test_if_it_has_outputs() -> None
     assert set(kind_names()) == rollout.SERVED
 
 
+BROKEN: Final = {
+    "misspelt": "kind: lfit\n",
+    "no_value": "kind:\n",
+    "no_word": "kind: [lift]\n",
+    "other_key": "knid: lift\nbuses: {}\n",
+    "unparsable": "kind: lift\nlifts: {\n",
+    "two_texts": "kind: lift\n---\nkind: door\n",
+    "empty": "",
+    "text": "lift\n",
+}
+"""Device YAMLs that no service can run. `rmf-bridge check` refuses them, so they must reach it."""
+
+
 def test_a_folder_is_sorted_by_kind(tmp_path: Path) -> None:
     for kind in ("lift", "alarm", "door_supervisor"):
         (tmp_path / f"{kind}.yaml").write_text(f"kind: {kind}\n")
     (tmp_path / "profile.yaml").write_text("registers: {}\n")
+    for name, text in BROKEN.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
 
     def names(files: list[str]) -> list[str]:
         return [Path(file).stem for file in files]
 
-    assert names(rollout.rmf_files(str(tmp_path))) == ["alarm", "door_supervisor", "lift"]
+    served = ["alarm", "door_supervisor", "lift"]
+    assert names(rollout.rmf_files(str(tmp_path))) == sorted([*served, *BROKEN])
     assert names(rollout.rmf_files(str(tmp_path), "daemon")) == ["alarm", "lift"]
     assert names(rollout.rmf_files(str(tmp_path), "supervisors")) == ["door_supervisor"]
     assert names(rollout.rmf_files(str(tmp_path), "outputs")) == ["lift"]
     assert names(rollout.rmf_beside(str(tmp_path))) == ["profile"]
     assert "there is no form" in rollout.rmf_untested_file(str(tmp_path / "lift.yaml"))
+
+
+def test_check_refuses_each_broken_file_and_no_role_copies_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in BROKEN.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    for file in rollout.rmf_files(str(tmp_path)):
+        assert cli.main(["check", "-q", file]) == os.EX_CONFIG
+        assert file in capsys.readouterr().err
+    assert rollout.rmf_beside(str(tmp_path)) == []
+    assert [rollout.rmf_files(str(tmp_path), role) for role in rollout.ROLES] == [[], [], []]
+
+
+@pytest.mark.parametrize("name", ["lift.yml", "lift.YAML"])
+def test_a_file_with_a_name_that_no_service_has_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("kind: lift\n")
+    for sort in (rollout.rmf_files, rollout.rmf_beside):
+        with pytest.raises(ValueError, match=f"{name}: a service's file ends with .yaml"):
+            sort(str(tmp_path))
+
+
+def test_every_shipped_profile_and_map_is_beside_and_every_device_yaml_is_none() -> None:
+    top = COLLECTION.parents[1]
+    assert len(rollout.rmf_beside(str(top / "drivers/profiles"))) > 3
+    beside = [Path(file).name for file in rollout.rmf_beside(str(top / "config"))]
+    assert beside == ["fleet_tiny.yaml", "fleet_tiny_graph.yaml"]
 
 
 def test_one_machine_is_changed_at_a_time_after_all_were_looked_at() -> None:
