@@ -18,6 +18,7 @@ import msgspec
 from bridges.messages.words import printable
 from bridges.runtime.daemons import NONE, DaemonStatus, daemons, units
 from bridges.runtime.faults import Remedy, here, remedies, values
+from bridges.runtime.services import service_name
 from bridges.runtime.subject import Status
 from bridges.system.directories import runtimes
 from bridges.system.paint import bold, red
@@ -65,9 +66,10 @@ def run(args: argparse.Namespace) -> int:
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
         there = [one.name for one in found if one.state != "stopped" or one.unit]
-        found = [one for one in found if one.name == Path(args.name).stem]
+        name = service_name(args.name)
+        found = [one for one in found if one.name == name]
         if there and not found:
-            print(f"no daemon {Path(args.name).stem}; there is {', '.join(there)}", file=sys.stderr)
+            print(f"no daemon {name}; there is {', '.join(there)}", file=sys.stderr)
             if not args.json:
                 return NONE
     else:  # leave out stopped daemons that a person started by hand

@@ -237,6 +237,16 @@ def test_each_fault_has_a_remedy_and_each_remedy_belongs_to_a_fault() -> None:
     assert known - named - constants - hazards == set()
 
 
+@pytest.mark.parametrize("name", ["my.lift", "config/my.lift.yaml", "my.lift.yml"])
+def test_a_daemon_with_a_dot_in_its_name_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "rmf-bridge").mkdir()
+    with served(tmp_path / "rmf-bridge" / "my.lift", lift()):
+        assert cli.main(["status", name]) == WELL
+
+
 def test_an_unknown_name_is_answered_with_the_known_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
