@@ -79,7 +79,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     },
     "disable": {
         0: "the service has ended",
-        64: "no service can have this name",
+        64: "there is no service of this name",
         69: "an output is not verified off",
         **ROOT,
     },

@@ -138,13 +138,9 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") 
 
     `keeps`: a systemd unit. If it ran before and a step fails, it is started again.
     """
+    if code := not_possible(args):
+        return code
     live = args.root == Path("/")
-    if live and not args.dry_run and os.geteuid() != 0:
-        print("only root may do that: use sudo, or --dry-run to see the steps", file=sys.stderr)
-        return os.EX_NOPERM
-    if not args.root.is_dir():
-        print(f"{args.root} is not a folder: is the card mounted?", file=sys.stderr)
-        return os.EX_NOINPUT
     ran = keeps and live and not args.dry_run and _did(("systemctl", "--quiet", "is-active", keeps))
     for step in steps:
         if not live and (
@@ -158,6 +154,18 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") 
             if ran:
                 _did(("systemctl", "start", keeps))
             return code
+    return 0
+
+
+def not_possible(args: argparse.Namespace) -> int:
+    """Return 77 if only root may change this system, and 66 if the folder of `--root` is missing.
+    Otherwise return 0."""
+    if args.root == Path("/") and not args.dry_run and os.geteuid() != 0:
+        print("only root may do that: use sudo, or --dry-run to see the steps", file=sys.stderr)
+        return os.EX_NOPERM
+    if not args.root.is_dir():
+        print(f"{args.root} is not a folder: is the card mounted?", file=sys.stderr)
+        return os.EX_NOINPUT
     return 0
 
 

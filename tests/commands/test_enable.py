@@ -127,8 +127,12 @@ def test_a_card_that_is_not_mounted_is_reported_before_the_first_step(
 
 
 def test_a_dry_run_prints_every_step_and_does_nothing(
-    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    calls: list[list[str]],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(disable, "services", lambda root: {"lift_dry_contact"})
     assert main(["disable", str(LIFT), "--dry-run"]) == 0
     assert main(["enable", str(LIFT), "--root", str(tmp_path), "--dry-run"]) == 0
     printed = capsys.readouterr().out.splitlines()
@@ -185,6 +189,37 @@ def test_only_root_changes_a_running_system(
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     assert main(["enable", str(LIFT)]) == os.EX_NOPERM
     assert main(["disable", "lift_dry_contact"]) == os.EX_NOPERM
+    assert calls == []
+
+
+@pytest.mark.parametrize(
+    "left",
+    [
+        "etc/rmf-bridges/my.lift.yaml",
+        "etc/systemd/system/rmf-bridge@my.lift.service.d/10-enable.conf",
+        "etc/systemd/system/rmf-bridges.target.wants/rmf-bridge@my.lift.service",
+        "var/lib/rmf-bridge/my.lift/claimed-1.json",
+    ],
+)
+@pytest.mark.parametrize("name", ["my.lift", "/x/my.lift.yaml", "my.lift.yml"])
+def test_a_service_with_one_file_left_can_be_disabled(
+    tmp_path: Path, calls: list[list[str]], left: str, name: str
+) -> None:
+    (tmp_path / left).parent.mkdir(parents=True)
+    (tmp_path / left).touch()
+    assert main(["disable", name, "--root", str(tmp_path)]) == 0
+    assert calls == [["systemctl", f"--root={tmp_path}", "disable", "rmf-bridge@my.lift.service"]]
+
+
+def test_the_name_of_no_service_is_refused_with_the_known_names(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = ["--root", str(tmp_path)]
+    main(["enable", str(LIFT), *root])
+    calls.clear()
+    assert main(["disable", "lift_dry", *root]) == os.EX_USAGE
+    assert capsys.readouterr().err == "no service lift_dry; there is lift_dry_contact\n"
+    assert main(["disable", "lift_dry", *root, "--dry-run"]) == os.EX_USAGE
     assert calls == []
 
 
