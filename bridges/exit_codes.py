@@ -71,10 +71,11 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     },
     "backup": {
         0: "saved, or restored and every service runs",
-        66: "FILE is no backup, or there is nothing to save",
+        **ROOT,
+        66: "FILE is no backup, the backup lacks a file that cannot be read, or the folder of `--root` is"
+        " missing",
         69: "an output is not verified off",
         73: "a file cannot be written, or FILE exists",
-        **ROOT,
         78: "a restored YAML has an error",
     },
     "disable": {

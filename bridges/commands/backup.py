@@ -15,7 +15,9 @@ door, although the robot has left. If the daemon restored that hold, it would op
 """
 
 import argparse
+import errno
 import os
+import stat
 import sys
 import tarfile
 import time
@@ -27,7 +29,7 @@ from typing import Final
 from bridges.commands import enable
 from bridges.runtime.daemons import UNIT
 from bridges.runtime.runtime_directory import KEPT
-from bridges.runtime.services import CONFIG, add_root, carry_out, unit
+from bridges.runtime.services import CONFIG, add_root, carry_out, not_possible, unit
 from bridges.settings.load import Config, SettingsError, understood
 from bridges.system import files
 from bridges.system.directories import SERVICE_STATE
@@ -50,8 +52,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if all went well. Return 66 if FILE is no backup, 73 if a file cannot be written, and 78
-    for an invalid YAML."""
+    """Return 0 if all went well. Return 66 if FILE is no backup, or if it lacks a file that cannot be
+    read. Return 73 if a file cannot be written, 77 if the user is not root, and 78 for an invalid
+    YAML."""
+    if code := not_possible(args):
+        return code
     if not args.restore:
         return _save(args.file, args.root, dry_run=args.dry_run)
     try:
@@ -64,14 +69,20 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(file: Path, root: Path, *, dry_run: bool) -> int:
-    found = [*_found(root)]
-    if not found:
-        print(f"nothing to save: there is no {root / CONFIG}", file=sys.stderr)
+    lost: list[str] = []
+    kept: list[Path] = []
+    for path in _found(root, lost):
+        if why := _unusable(path, root):
+            lost.append(f"{path}: {why}")
+        elif _is_secret(path, root):
+            print(f"left out, as a secret: /{path.relative_to(root)}; copy this file by hand")
+        else:
+            kept.append(path)
+    for reason in lost:
+        print(f"NOT saved: {reason}", file=sys.stderr)
+    if not kept:
+        print(f"nothing to save: there is no file in {root / CONFIG}", file=sys.stderr)
         return os.EX_NOINPUT
-    secrets = [path for path in found if _is_secret(path, root)]
-    for path in secrets:
-        print(f"left out, as a secret: /{path.relative_to(root)}; copy this file by hand")
-    kept = [path for path in found if path not in secrets]
     if not dry_run:
         try:
             _write_archive(file, root, kept)
@@ -80,7 +91,7 @@ def _save(file: Path, root: Path, *, dry_run: bool) -> int:
             return os.EX_CANTCREAT
     for path in kept:
         print(f"{'to save' if dry_run else 'saved'}: /{path.relative_to(root)}")
-    return 0
+    return os.EX_NOINPUT if lost else 0
 
 
 def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
@@ -96,6 +107,23 @@ def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
                 archive.add(path, name, recursive=False)
 
 
+def _unusable(path: Path, root: Path) -> str:
+    """Return the reason why the content of a file cannot be saved; "" if it can. A secret need not be
+    readable."""
+    if path.parent == root / WANTS:
+        return ""
+    try:
+        found = path.stat()
+    except OSError as error:
+        return str(error.strerror)
+    if not stat.S_ISREG(found.st_mode):
+        return "it is no regular file"
+    if found.st_size > MOST_BYTES:
+        return f"it is larger than {MOST_BYTES >> 20} MiB"
+    readable = os.access(path, os.R_OK) or _is_secret(path, root)
+    return "" if readable else os.strerror(errno.EACCES)
+
+
 def _is_secret(path: Path, root: Path) -> bool:
     """Return whether only the owner may read the file. Return False for the file of the page's users,
     and for a daemon's memory, because the backup must contain both."""
@@ -109,13 +137,35 @@ def _is_private(path: PurePath) -> bool:
     return path == PAGE_USERS or path.name == KEPT
 
 
-def _found(root: Path) -> Iterator[Path]:
-    """Yield the files to save."""
-    yield from sorted(one for one in (root / CONFIG).rglob("*") if one.is_file())
-    yield from sorted((root / SERVICE_STATE.relative_to("/")).glob(f"*/{KEPT}"))
-    if (root / PAGE_USERS).is_file():
-        yield root / PAGE_USERS
-    yield from sorted((root / WANTS).glob("rmf-bridge*.service"))
+def _found(root: Path, lost: list[str]) -> Iterator[Path]:
+    """Yield the files to save. Add to `lost` a reason for each file or folder that cannot be saved."""
+    yield from _files(root / CONFIG, lost)
+    for folder in _entries(root / SERVICE_STATE.relative_to("/"), lost):
+        if os.path.isdir(folder):
+            yield from (one for one in _entries(folder, lost) if one.name == KEPT)
+    users = root / PAGE_USERS
+    yield from (one for one in _entries(users.parent, lost) if one == users)
+    yield from (one for one in _entries(root / WANTS, lost) if one.match("rmf-bridge*.service"))
+
+
+def _files(folder: Path, lost: list[str]) -> Iterator[Path]:
+    """Yield everything below a folder that is no folder itself."""
+    for path in _entries(folder, lost):
+        if os.path.isdir(path) and not path.is_symlink():
+            yield from _files(path, lost)
+        else:
+            yield path
+
+
+def _entries(folder: Path, lost: list[str]) -> list[Path]:
+    """Return the entries of a folder in order. If this user may not read it, add this to `lost`."""
+    try:
+        return sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        lost.append(f"{folder}: {error.strerror}")
+        return []
 
 
 def _read(file: Path) -> Iterator[tuple[PurePosixPath, tuple[bytes, float]]]:

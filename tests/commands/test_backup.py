@@ -1,16 +1,19 @@
 """`rmf-bridge backup`: the files that it saves or leaves out, and the content of a restored machine."""
 
+import argparse
 import io
 import os
 import shutil
 import subprocess
 import tarfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from bridges import cli
+from bridges.commands import backup
 from bridges.commands.backup import FRESH_S, PAGE_USERS
 from bridges.runtime.runtime_directory import KEPT
 from bridges.runtime.services import make_user
@@ -65,6 +68,19 @@ def restored(root: Path, file: Path, *options: str) -> int:
 
 def content(root: Path) -> dict[str, str]:
     return {str(p.relative_to(root)): p.read_text() for p in root.rglob("*") if p.is_file()}
+
+
+def as_nobody(code: Callable[[], int]) -> int:
+    """Run this as a user who owns nothing, and return its result, an exit code."""
+    if pid := os.fork():
+        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    try:
+        os.setgroups([])
+        os.setgid(65534)
+        os.setuid(65534)
+        os._exit(code())
+    finally:
+        os._exit(99)
 
 
 MEMORY = f"var/lib/rmf-bridge/door_supervisor/{KEPT}"
@@ -164,6 +180,57 @@ def test_a_second_backup_does_not_overwrite_the_first_and_a_dry_run_writes_nothi
 def test_a_machine_without_files_has_nothing_to_save(tmp_path: Path) -> None:
     assert saved(tmp_path, tmp_path / "backup.tar.gz") == os.EX_NOINPUT
     assert not (tmp_path / "backup.tar.gz").exists()
+
+
+def test_only_root_saves_and_restores_a_running_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    file = tmp_path / "backup.tar.gz"
+    for options in ([], ["--restore"]):
+        assert cli.main(["backup", str(file), *options]) == os.EX_NOPERM
+        assert capsys.readouterr().err.startswith("only root may do that")
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("options", [[], ["--restore"]])
+def test_a_root_that_is_not_mounted_is_reported_and_not_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str]
+) -> None:
+    root, file = tmp_path / "card", tmp_path / "backup.tar.gz"
+    assert cli.main(["backup", str(file), *options, "--root", str(root)]) == os.EX_NOINPUT
+    assert capsys.readouterr().err == f"{root} is not a folder: is the card mounted?\n"
+    assert not root.exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+@pytest.mark.parametrize(
+    ("closed", "mode"),
+    [
+        (str(PAGE_USERS.parent), 0o700),
+        ("var/lib/rmf-bridge/door_supervisor", 0o750),
+        ("var/lib/rmf-bridge", 0o700),
+        ("etc/rmf-bridges", 0o700),
+        ("etc/rmf-bridges/page.env", 0o640),
+        (MEMORY, 0o600),
+    ],
+)
+def test_a_place_that_this_user_may_not_read_is_told_and_no_success(
+    machine: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    closed: str,
+    mode: int,
+) -> None:
+    (machine / PAGE_USERS).chmod(0o644)
+    (machine / closed).chmod(mode)
+    machine.chmod(0o777)
+    monkeypatch.chdir(machine)  # nobody may not reach this folder by its whole path
+    args = argparse.Namespace(file=Path("b.tar.gz"), root=Path(), restore=False, dry_run=False)
+    assert as_nobody(lambda: backup.run(args)) == os.EX_NOINPUT
+    told = capfd.readouterr().err
+    assert f"NOT saved: {closed}: Permission denied\n" in told
+    assert "Traceback" not in told
 
 
 @pytest.mark.parametrize("bytes_left", [0, 40, 200])
