@@ -71,9 +71,10 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     },
     "backup": {
         0: "saved, or restored and every service runs",
+        65: "an enabled service has no YAML in the backup, so it cannot be restored",
         **ROOT,
-        66: "FILE is no backup, the backup lacks a file that cannot be read, or the folder of `--root` is"
-        " missing",
+        66: "FILE is no backup, the backup lacks a file that cannot be read, or the folder of `--root`"
+        " is missing",
         69: "an output is not verified off",
         73: "a file cannot be written, or FILE exists",
         78: "a restored YAML has an error",

@@ -9,6 +9,7 @@ import tarfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 
@@ -180,6 +181,90 @@ def test_a_second_backup_does_not_overwrite_the_first_and_a_dry_run_writes_nothi
 def test_a_machine_without_files_has_nothing_to_save(tmp_path: Path) -> None:
     assert saved(tmp_path, tmp_path / "backup.tar.gz") == os.EX_NOINPUT
     assert not (tmp_path / "backup.tar.gz").exists()
+
+
+def test_links_are_saved_as_the_files_behind_them(
+    machine: Path, tmp_path: Path, calls: list[list[str]]
+) -> None:
+    config, home = machine / "etc/rmf-bridges", machine / "srv"
+    home.mkdir()
+    (config / "ward.yaml").rename(home / "ward.yaml")
+    (config / "ward.yaml").symlink_to("../../srv/ward.yaml")
+    (home / "ca.pem").write_text("certificate")
+    (config / "ca.pem").symlink_to(home / "ca.pem")
+    (config / "again.pem").hardlink_to(home / "ca.pem")
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == 0
+    assert restored(new, file) == 0
+    after = content(new)
+    for name in ("ward.yaml", "ca.pem", "again.pem"):
+        assert after[f"etc/rmf-bridges/{name}"] == (config / name).read_text()
+    assert calls[-1][-1] == "rmf-bridge@ward.service"
+
+
+def test_what_cannot_be_saved_is_told_and_the_rest_can_be_restored(
+    machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = machine / "etc/rmf-bridges"
+    (tmp_path / "host.pem").touch()
+    (config / "of_host.pem").symlink_to(tmp_path / "host.pem")
+    (config / "dangling.pem").symlink_to("nowhere.pem")
+    (config / "folder").symlink_to(machine / "var")
+    os.mkfifo(config / "pipe")
+    with (config / "core").open("wb") as big:
+        big.truncate(backup.MOST_BYTES + 1)
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == os.EX_NOINPUT
+    assert capsys.readouterr().err.splitlines() == [
+        f"NOT saved: {config}/core: it is larger than 16 MiB",
+        f"NOT saved: {config}/dangling.pem: No such file or directory",
+        f"NOT saved: {config}/folder: it is no regular file",
+        f"NOT saved: {config}/of_host.pem: it is a link that leads out of {machine}",
+        f"NOT saved: {config}/pipe: it is no regular file",
+    ]
+    assert restored(new, file) == 0
+
+
+def test_a_service_whose_yaml_is_a_secret_is_named_at_the_backup_and_at_the_restore(
+    machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    ward = machine / "etc/rmf-bridges/ward.yaml"
+    ward.chmod(0o600)
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == os.EX_DATAERR
+    told = capsys.readouterr()
+    assert "left out, as a secret: /etc/rmf-bridges/ward.yaml" in told.out
+    assert told.err == (
+        "the service rmf-bridge@ward.service cannot be restored from this backup, which lacks"
+        " /etc/rmf-bridges/ward.yaml: copy this file by hand\n"
+    )
+    assert restored(new, file) == os.EX_DATAERR
+    assert capsys.readouterr().err == (
+        "the service rmf-bridge@ward.service is NOT restored, because the backup lacks"
+        " /etc/rmf-bridges/ward.yaml: copy this file, then run rmf-bridge enable"
+        " /etc/rmf-bridges/ward.yaml\n"
+    )
+    assert calls == []
+    shutil.copy(ward, new / "etc/rmf-bridges/ward.yaml")  # a person has copied it
+    assert restored(new, file) == 0
+    assert calls[-1][-1] == "rmf-bridge@ward.service"
+
+
+def test_a_yaml_is_restored_together_with_the_dbc_file_that_it_names(
+    machine: Path, tmp_path: Path, calls: list[list[str]]
+) -> None:
+    config = machine / "etc/rmf-bridges"
+    shutil.copy(ROOT / "drivers/profiles/wiferion.dbc", config / "ours.dbc")
+    _, frames = (ROOT / "drivers/profiles/wiferion.yaml").read_text().split("\nmap:\n")
+    frames = indent(frames.replace("wiferion.dbc", "/etc/rmf-bridges/ours.dbc"), "    ")
+    station = (ROOT / "config/charger_wiferion.yaml").read_text()
+    (config / "ward.yaml").write_text(
+        station.replace("    profile: wiferion\n", f"    map:\n{frames}\n")
+    )
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == 0
+    assert restored(new, file) == 0
+    assert calls[-1][-1] == "rmf-bridge@ward.service"
 
 
 def test_only_root_saves_and_restores_a_running_system(
