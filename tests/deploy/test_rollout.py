@@ -6,6 +6,7 @@
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from hashlib import sha256
@@ -207,6 +208,58 @@ def test_nothing_is_changed_before_the_devices_are_idle_and_the_old_version_is_k
     assert change["block"][0]["ignore_unreachable"]  # else `rescue` would be passed over
     assert [*change["rescue"][-1]] == ["name", "ansible.builtin.fail"]
     assert change["rescue"][-2]["ansible.builtin.include_tasks"] == "put_back.yml"
+
+
+def script(file: str, name: str, root: Path) -> str:
+    """Return the shell script of a task, for a machine whose root is this folder."""
+    tasks = yaml.safe_load((COLLECTION / "playbooks/tasks" / file).read_text())
+    text = str(*(task["ansible.builtin.shell"] for task in tasks if task["name"] == name))
+    text = text.replace("{{ rmf_served | map('quote') | join(' ') }}", "ward")
+    text = text.replace("{{ rmf_old.stdout }}", "0.1.0").replace("tar -C / ", f"tar -C {root} ")
+    for folder in ("/etc/", "/var/", "/run/"):
+        text = re.sub(rf"(?<![\w$/]){folder}", f"{root}{folder}", text)
+    return text
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o644])
+def test_each_old_file_comes_back_even_a_secret_and_only_new_services_are_removed(
+    tmp_path: Path, mode: int
+) -> None:
+    root, programs = tmp_path / "root", tmp_path / "bin"
+    config, new = root / "etc/rmf-bridges", root / "run/rmf-bridges-rollout"
+    for folder in (programs, config, new, root / "var/backups"):
+        folder.mkdir(parents=True)
+    for name in ("systemctl", "apt-get", "dpkg", "dpkg-query", "timeout", "rmf-bridge"):
+        (programs / name).write_text(f'#!/bin/sh\necho "{name} $*" >> {tmp_path}/calls\n')
+        (programs / name).chmod(0o755)
+    with (programs / "rmf-bridge").open("a") as out:
+        out.write(
+            'if [ "$1" = backup ]; then exit 65; fi\nif [ "$1" = status ]; then echo []; fi\n'
+        )
+    (config / "ward.yaml").write_text("old")
+    (config / "ward.yaml").chmod(mode)
+
+    def run(file: str, name: str) -> None:
+        env = os.environ | {"PATH": f"{programs}:{os.environ['PATH']}"}
+        words = ["sh", "-c", script(file, name, root)]
+        done = subprocess.run(words, env=env, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+    run("change.yml", "Keep the old version and the old configuration")
+    kept = root / "var/backups/rmf-bridges-rollout/files.tar.gz"
+    assert kept.stat().st_mode & 0o777 == 0o600
+    (tmp_path / "calls").unlink()
+    for name in ("ward", "lab"):  # `lab` is a new service
+        for folder in (config, new):
+            (folder / f"{name}.yaml").write_text("new")
+    run("put_back.yml", "Put the old files and packages back")
+    assert {path.name: path.read_text() for path in config.iterdir()} == {"ward.yaml": "old"}
+    assert (config / "ward.yaml").stat().st_mode & 0o777 == mode
+    calls = (tmp_path / "calls").read_text().splitlines()
+    assert [one for one in calls if one.startswith("rmf-bridge ")] == [
+        "rmf-bridge disable lab",
+        f"rmf-bridge enable {config}/ward.yaml",
+    ]
 
 
 def test_ansible_reads_the_playbook(tmp_path: Path) -> None:
