@@ -248,10 +248,12 @@ def _configs(
     beside = {path: content for path, (content, _) in saved.items()}  # perhaps not on this machine
     texts.give({str(at / path): beside[path] for path in beside for at in (Path("/"), root)})
     for path in map(_yaml, filter(_is_ours, units)):
-        if path in saved:
-            yield understood(root / path, saved[path][0])
-        elif (root / path).is_file():
-            yield load(root / path)
+        if path in saved or (root / path).is_file():
+            known = path in saved
+            config = understood(root / path, beside[path]) if known else load(root / path)
+            if problems := enable.site_problems(config, root):
+                raise SettingsError(problems)
+            yield config
 
 
 def _is_fresh(path: PurePosixPath, mtime: float) -> bool:

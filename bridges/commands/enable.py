@@ -21,6 +21,9 @@ import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.runtime import drop_in
 from bridges.runtime.services import (
@@ -44,6 +47,9 @@ from bridges.settings.load import Config, Problem, SettingsError, load
 from bridges.settings.named_files import SECRETS, named_files
 from bridges.system.directories import GROUPS, user_of
 
+FLEET: Final = "fleet"
+BESIDE: Final = f"a fleet's YAML: write whole paths, or copy both files of RMF to /{CONFIG}"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `enable`."""
@@ -66,6 +72,8 @@ def run(args: argparse.Namespace) -> int:
         return _wrong(error.problems)
     if problems := list(_taken(config, args.root)):
         return _wrong(problems)
+    if problems := site_problems(config, args.root):
+        return _wrong([*problems, BESIDE])
     if args.drop_in:
         user = user_of(args.file.stem)
         known = user if user in numbers(args.root / "etc/passwd") else ""
@@ -119,6 +127,26 @@ def _taken(config: Config, root: Path) -> Iterator[Problem]:
     return (problem for problem in found if problem.file == str(config.path))
 
 
+def site_problems(config: Config, root: Path) -> list[Problem]:
+    """Return the problems of the RMF files that a fleet's YAML names, if the YAML is in
+    /etc/rmf-bridges. `enable` copies the YAML there, and relative paths begin at the YAML's folder."""
+    if config.kind != FLEET:
+        return []
+    from bridges.settings.fleet_site import read_site
+
+    def below_root(file: str) -> str:
+        return str(root / file.lstrip("/")) if file.startswith("/") else file
+
+    section = config.section
+    names = {key: below_root(getattr(section, key)) for key in ("config", "graph")}
+    path = root / CONFIG / f"{config.path.stem}.yaml"
+    try:
+        read_site(replace(config, path=path, section=replace(section, **names)))
+    except SettingsError as error:
+        return list(error.problems)
+    return []
+
+
 def _neighbours(root: Path, name: str) -> Iterator[Config]:
     """Yield the valid files of the other services."""
     for file in sorted((root / CONFIG).glob("*.yaml")):
@@ -127,7 +155,7 @@ def _neighbours(root: Path, name: str) -> Iterator[Config]:
                 yield load(file)
 
 
-def _wrong(problems: Iterable[Problem]) -> int:
+def _wrong(problems: Iterable[Problem | str]) -> int:
     for problem in problems:
         print(problem, file=sys.stderr)
     return os.EX_CONFIG

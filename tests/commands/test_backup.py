@@ -267,6 +267,27 @@ def test_a_yaml_is_restored_together_with_the_dbc_file_that_it_names(
     assert calls[-1][-1] == "rmf-bridge@ward.service"
 
 
+@pytest.mark.parametrize("lost", ["", "fleet_tiny.yaml", "fleet_tiny_graph.yaml"])
+def test_a_fleet_is_restored_only_with_the_files_that_it_names(
+    machine: Path,
+    tmp_path: Path,
+    calls: list[list[str]],
+    capsys: pytest.CaptureFixture[str],
+    lost: str,
+) -> None:
+    config = machine / "etc/rmf-bridges"
+    for name in ("fleet_tiny.yaml", "fleet_tiny_graph.yaml"):
+        shutil.copy(ROOT / "config" / name, config)
+    shutil.copy(ROOT / "config/robots_http.yaml", config / "ward.yaml")
+    if lost:
+        (config / lost).unlink()
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    saved(machine, file)
+    assert restored(new, file) == (os.EX_CONFIG if lost else 0)
+    assert (content(new) == {}) == bool(lost)
+    assert lost in capsys.readouterr().err
+
+
 def test_only_root_saves_and_restores_a_running_system(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -296,6 +296,41 @@ def test_two_services_cannot_have_one_secret(
     assert f"{second}:15:17: {wanted}: give each service a copy" in told
 
 
+def site(folder: Path) -> Path:
+    """Copy a fleet's YAML and the two files of RMF to a new folder. Return the YAML."""
+    folder.mkdir(parents=True)
+    for name in ("robots_http.yaml", "fleet_tiny.yaml", "fleet_tiny_graph.yaml"):
+        (folder / name).write_bytes((CONFIG / name).read_bytes())
+    return folder / "robots_http.yaml"
+
+
+def test_a_fleet_whose_files_would_be_missing_is_refused_before_the_first_step(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = tmp_path / "root"
+    root.mkdir()
+    file = site(tmp_path / "site")
+    assert main(["enable", str(file), "--root", str(root)]) == os.EX_CONFIG
+    *told, advice = capsys.readouterr().err.splitlines()
+    target = root / "etc/rmf-bridges"
+    for line, name in {12: "fleet_tiny.yaml", 13: "fleet_tiny_graph.yaml"}.items():
+        assert f"{target}/robots_http.yaml:{line}:3: {target}/{name} cannot be read" in told
+    assert advice == enable.BESIDE
+    assert (calls, list(root.iterdir())) == ([], [])
+
+
+def test_a_fleet_is_enabled_with_its_files_beside_it_or_by_whole_paths(
+    tmp_path: Path, calls: list[list[str]]
+) -> None:
+    beside, whole = tmp_path / "beside", tmp_path / "whole"
+    site(beside / "etc/rmf-bridges")
+    file = site(tmp_path / "site")
+    assert main(["enable", str(file), "--root", str(beside)]) == 0
+    site(whole / "srv")
+    file.write_text(file.read_text().replace(" fleet_tiny", " /srv/fleet_tiny"))
+    assert main(["enable", str(file), "--root", str(whole)]) == 0
+
+
 def test_a_packages_upgrade_keeps_the_services_user(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
