@@ -30,6 +30,7 @@ from bridges.runtime.services import (
     CONFIG,
     INSTANCE,
     NO_INSTANCE,
+    SYSTEMD,
     GiveSecret,
     Run,
     Step,
@@ -72,8 +73,8 @@ def run(args: argparse.Namespace) -> int:
         return _wrong(error.problems)
     if problems := list(_taken(config, args.root)):
         return _wrong(problems)
-    if problems := site_problems(config, args.root):
-        return _wrong([*problems, BESIDE])
+    if of_site := site_problems(config, args.root):
+        return _wrong([*of_site, BESIDE])
     if args.drop_in:
         user = user_of(args.file.stem)
         known = user if user in numbers(args.root / "etc/passwd") else ""
@@ -120,11 +121,15 @@ def _secrets(config: Config, root: Path) -> Iterator[Path]:
             yield path
 
 
-def _taken(config: Config, root: Path) -> Iterator[Problem]:
-    """Yield a problem for each resource or secret that this file shares with another service's file."""
-    all_files = [*_neighbours(root, config.path.stem), config]
-    found = (*taken(all_files), *shared_secrets(all_files))
-    return (problem for problem in found if problem.file == str(config.path))
+def _taken(config: Config, root: Path) -> Iterator[Problem | str]:
+    """Yield a problem for each resource or secret that this file shares with another service's file.
+    Yield advice if that service is disabled."""
+    enabled = {link.name for link in (root / SYSTEMD).glob("*.wants/*")}
+    for other in _neighbours(root, config.path.stem):
+        found = [*taken([other, config]), *shared_secrets([other, config])]
+        yield from found
+        if found and unit(other.path.stem) not in enabled:
+            yield f"{other.path.stem} is disabled: if it is no longer used, move {other.path} away"
 
 
 def site_problems(config: Config, root: Path) -> list[Problem]:

@@ -169,6 +169,25 @@ def test_pins_of_another_service_are_refused_with_their_place(
     assert [path.name for path in (tmp_path / "etc/rmf-bridges").iterdir()] == [LIFT.name]
 
 
+@pytest.mark.parametrize("enabled", [True, False])
+def test_the_file_of_a_disabled_service_still_blocks_its_pins_but_this_is_told(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str], enabled: bool
+) -> None:
+    main(["enable", str(LIFT), "--root", str(tmp_path)])
+    if enabled:  # the test's systemctl makes no link
+        link = tmp_path / "etc/systemd/system/rmf-bridges.target.wants" / UNIT
+        link.parent.mkdir()
+        link.symlink_to("/usr/lib/systemd/system/rmf-bridge@.service")
+    other = CONFIG / "lift_relay_board.yaml"
+    assert main(["enable", str(other), "--root", str(tmp_path)]) == os.EX_CONFIG
+    told = capsys.readouterr().err
+    assert f" is used in {tmp_path / TARGET} too" in told
+    advice = (
+        f"lift_dry_contact is disabled: if it is no longer used, move {tmp_path / TARGET} away\n"
+    )
+    assert told.endswith(advice) != enabled
+
+
 @pytest.mark.parametrize("name", ["my lift.yaml", "-x.yaml", "a@b.yaml", "%i.yaml"])
 def test_a_file_that_cannot_name_a_service_is_refused(
     tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
