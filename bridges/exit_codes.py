@@ -17,6 +17,7 @@ ROOT: Final = {
     74: "a file was not written",
     77: "not root",
 }
+SYSTEMS: Final = "a program of systemd failed and said why; other codes of it are possible"
 GRAPH: Final = "nothing was heard, or the graph cannot be joined"
 RECORDING: Final = {66: "the recording cannot be read"}
 SIMULATION: Final = {
@@ -65,21 +66,26 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     },
     "enable": {
         0: "the service runs",
+        1: SYSTEMS,
         69: "an output is not verified off",
         **ROOT,
-        78: "the YAML has an error, or contradicts another service's YAML",
+        78: "the YAML or a file that it names has an error, or it contradicts another service's YAML",
     },
     "backup": {
         0: "saved, or restored and every service runs",
-        66: "FILE is no backup, or there is nothing to save",
+        1: SYSTEMS,
+        65: "an enabled service has no YAML in the backup, so it cannot be restored",
+        **ROOT,
+        66: "FILE is no backup, the backup lacks a file that cannot be read, or the folder of `--root`"
+        " is missing",
         69: "an output is not verified off",
         73: "a file cannot be written, or FILE exists",
-        **ROOT,
-        78: "a restored YAML has an error",
+        78: "a restored YAML, or a file that it names, has an error",
     },
     "disable": {
         0: "the service has ended",
-        64: "no service can have this name",
+        1: SYSTEMS,
+        64: "there is no service of this name",
         69: "an output is not verified off",
         **ROOT,
     },
@@ -115,7 +121,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         0: "all is well",
         1: "a daemon has a fault",
         2: "a daemon died or is silent",
-        3: "there is no daemon, or this user may not see one",
+        3: "there is no such daemon, or this user may not see one",
         4: "with --idle: a device is in use, or nobody knows whether a device is in use",
     },
     "doctor": {

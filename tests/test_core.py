@@ -49,6 +49,7 @@ ON_REQUEST = {
     ("bridges.runtime.service", "bridges.runtime.fleet.service"),
     ("bridges.commands.run", "bridges.settings.fleet_site"),
     ("bridges.commands.check", "bridges.settings.fleet_site"),
+    ("bridges.commands.enable", "bridges.settings.fleet_site"),
 }
 """The permitted imports of extras by the core, as (core module, extra module). Each import runs only if
 a YAML needs the extra."""

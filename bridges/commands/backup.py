@@ -7,15 +7,19 @@ The backup contains:
 - the page's users with the hashes of their passwords
 - the files in which supervisors and coordinators keep their memory for a restart
 
-Any other file that only its owner may read counts as a secret. The command leaves secrets out and names
-them.
+Any other file that only its owner may read counts as a secret, even a device YAML. The command leaves
+secrets out and names them. It also names each service that has no YAML in the backup.
+
+The backup has the content behind a link, because the file behind the link may be in no backup.
 
 A memory is restored only if it is at most FRESH_S old. An older memory may say that a robot holds a
 door, although the robot has left. If the daemon restored that hold, it would open the door.
 """
 
 import argparse
+import errno
 import os
+import stat
 import sys
 import tarfile
 import time
@@ -27,10 +31,11 @@ from typing import Final
 from bridges.commands import enable
 from bridges.runtime.daemons import UNIT
 from bridges.runtime.runtime_directory import KEPT
-from bridges.runtime.services import CONFIG, add_root, carry_out, unit
-from bridges.settings.load import Config, SettingsError, understood
+from bridges.runtime.services import CONFIG, add_root, carry_out, not_possible, unit
+from bridges.settings.load import Config, SettingsError, load, understood
 from bridges.system import files
 from bridges.system.directories import SERVICE_STATE
+from drivers.profiles import texts
 
 FRESH_S: Final = 3600.0
 MOST_BYTES: Final = 16 << 20
@@ -50,8 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if all went well. Return 66 if FILE is no backup, 73 if a file cannot be written, and 78
-    for an invalid YAML."""
+    """Return 0 if all went well, and 65 if a service has no YAML in the backup. Return 66 if FILE is no
+    backup, or if it lacks a file that cannot be read. Return 73 if a file cannot be written, 77 if the
+    user is not root, and 78 for an invalid YAML."""
+    if code := not_possible(args):
+        return code
     if not args.restore:
         return _save(args.file, args.root, dry_run=args.dry_run)
     try:
@@ -64,14 +72,20 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(file: Path, root: Path, *, dry_run: bool) -> int:
-    found = [*_found(root)]
-    if not found:
-        print(f"nothing to save: there is no {root / CONFIG}", file=sys.stderr)
+    lost: list[str] = []
+    kept: list[Path] = []
+    for path in _found(root, lost):
+        if why := _unusable(path, root):
+            lost.append(f"{path}: {why}")
+        elif _is_secret(path, root):
+            print(f"left out, as a secret: /{path.relative_to(root)}; copy this file by hand")
+        else:
+            kept.append(path)
+    for reason in lost:
+        print(f"NOT saved: {reason}", file=sys.stderr)
+    if not kept:
+        print(f"nothing to save: there is no file in {root / CONFIG}", file=sys.stderr)
         return os.EX_NOINPUT
-    secrets = [path for path in found if _is_secret(path, root)]
-    for path in secrets:
-        print(f"left out, as a secret: /{path.relative_to(root)}; copy this file by hand")
-    kept = [path for path in found if path not in secrets]
     if not dry_run:
         try:
             _write_archive(file, root, kept)
@@ -80,20 +94,57 @@ def _save(file: Path, root: Path, *, dry_run: bool) -> int:
             return os.EX_CANTCREAT
     for path in kept:
         print(f"{'to save' if dry_run else 'saved'}: /{path.relative_to(root)}")
-    return 0
+    lacks = [one.name for one in kept if _is_ours(one.name) and root / _yaml(one.name) not in kept]
+    for name in lacks:
+        text = f"the service {name} cannot be restored from this backup, which lacks /{_yaml(name)}"
+        print(f"{text}: copy this file by hand", file=sys.stderr)
+    return os.EX_NOINPUT if lost else os.EX_DATAERR if lacks else 0
 
 
 def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
     """Write a new archive. Raises OSError, even if only the file exists already, because it may be
     another backup."""
     opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with open(opened, "wb") as out, tarfile.open(fileobj=out, mode="w:gz") as archive:
+    with (
+        open(opened, "wb") as out,
+        tarfile.open(fileobj=out, mode="w:gz", dereference=True) as archive,  # no links
+    ):
         for path in kept:
             name = str(path.relative_to(root))
             if path.parent == root / WANTS:
                 archive.addfile(tarfile.TarInfo(name))
             else:
                 archive.add(path, name, recursive=False)
+
+
+def _is_ours(name: str) -> bool:
+    """Return whether a unit with this name serves a YAML."""
+    return name.startswith(UNIT)
+
+
+def _yaml(name: str) -> PurePosixPath:
+    """Return the YAML of this unit, relative to the root."""
+    return PurePosixPath(CONFIG) / f"{name.removeprefix(UNIT).removesuffix('.service')}.yaml"
+
+
+def _unusable(path: Path, root: Path) -> str:
+    """Return the reason why the content of a file cannot be saved; "" if it can. A secret need not be
+    readable."""
+    if path.parent == root / WANTS:
+        return ""
+    try:
+        found = path.stat()
+        inside = root == Path("/") or path.resolve().is_relative_to(root.resolve())
+    except OSError as error:
+        return str(error.strerror)
+    if not stat.S_ISREG(found.st_mode):
+        return "it is no regular file"
+    if not inside:
+        return f"it is a link that leads out of {root}"
+    if found.st_size > MOST_BYTES:
+        return f"it is larger than {MOST_BYTES >> 20} MiB"
+    readable = os.access(path, os.R_OK) or _is_secret(path, root)
+    return "" if readable else os.strerror(errno.EACCES)
 
 
 def _is_secret(path: Path, root: Path) -> bool:
@@ -109,13 +160,35 @@ def _is_private(path: PurePath) -> bool:
     return path == PAGE_USERS or path.name == KEPT
 
 
-def _found(root: Path) -> Iterator[Path]:
-    """Yield the files to save."""
-    yield from sorted(one for one in (root / CONFIG).rglob("*") if one.is_file())
-    yield from sorted((root / SERVICE_STATE.relative_to("/")).glob(f"*/{KEPT}"))
-    if (root / PAGE_USERS).is_file():
-        yield root / PAGE_USERS
-    yield from sorted((root / WANTS).glob("rmf-bridge*.service"))
+def _found(root: Path, lost: list[str]) -> Iterator[Path]:
+    """Yield the files to save. Add to `lost` a reason for each file or folder that cannot be saved."""
+    yield from _files(root / CONFIG, lost)
+    for folder in _entries(root / SERVICE_STATE.relative_to("/"), lost):
+        if os.path.isdir(folder):
+            yield from (one for one in _entries(folder, lost) if one.name == KEPT)
+    users = root / PAGE_USERS
+    yield from (one for one in _entries(users.parent, lost) if one == users)
+    yield from (one for one in _entries(root / WANTS, lost) if one.match("rmf-bridge*.service"))
+
+
+def _files(folder: Path, lost: list[str]) -> Iterator[Path]:
+    """Yield everything below a folder that is no folder itself."""
+    for path in _entries(folder, lost):
+        if os.path.isdir(path) and not path.is_symlink():
+            yield from _files(path, lost)
+        else:
+            yield path
+
+
+def _entries(folder: Path, lost: list[str]) -> list[Path]:
+    """Return the entries of a folder in order. If this user may not read it, add this to `lost`."""
+    try:
+        return sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        lost.append(f"{folder}: {error.strerror}")
+        return []
 
 
 def _read(file: Path) -> Iterator[tuple[PurePosixPath, tuple[bytes, float]]]:
@@ -135,6 +208,11 @@ def _read(file: Path) -> Iterator[tuple[PurePosixPath, tuple[bytes, float]]]:
 
 def _restore(saved: dict[PurePosixPath, tuple[bytes, float]], args: argparse.Namespace) -> int:
     units = [path.name for path in saved if path.is_relative_to(WANTS)]
+    lacks = [
+        name
+        for name in units
+        if _is_ours(name) and _yaml(name) not in saved and not (args.root / _yaml(name)).is_file()
+    ]
     try:
         configs = [*_configs(saved, units, args.root)]
     except SettingsError as error:
@@ -154,20 +232,28 @@ def _restore(saved: dict[PurePosixPath, tuple[bytes, float]], args: argparse.Nam
         if code := carry_out(steps, args, keeps=unit(config.path.stem)):
             return code
     for name in units:
-        if not name.startswith(UNIT):
+        if not _is_ours(name):
             print(f"enable this service yourself: systemctl enable --now {name}")
-    return 0
+    for name in lacks:
+        text = f"the service {name} is NOT restored, because the backup lacks /{_yaml(name)}"
+        print(f"{text}: copy this file, then run rmf-bridge enable /{_yaml(name)}", file=sys.stderr)
+    return os.EX_DATAERR if lacks else 0
 
 
 def _configs(
     saved: dict[PurePosixPath, tuple[bytes, float]], units: list[str], root: Path
 ) -> Iterator[Config]:
-    """Yield the YAMLs of the enabled services. Raises SettingsError for an invalid YAML, before
-    anything is written."""
-    for name in units:
-        path = PurePosixPath(CONFIG) / f"{name.removeprefix(UNIT).removesuffix('.service')}.yaml"
-        if name.startswith(UNIT) and path in saved:
-            yield understood(root / path, saved[path][0])
+    """Yield the YAMLs of the enabled services. If the backup lacks a YAML, take the machine's. Raises
+    SettingsError for an invalid YAML, before anything is written."""
+    beside = {path: content for path, (content, _) in saved.items()}  # perhaps not on this machine
+    texts.give({str(at / path): beside[path] for path in beside for at in (Path("/"), root)})
+    for path in map(_yaml, filter(_is_ours, units)):
+        if path in saved or (root / path).is_file():
+            known = path in saved
+            config = understood(root / path, beside[path]) if known else load(root / path)
+            if problems := enable.site_problems(config, root):
+                raise SettingsError(problems)
+            yield config
 
 
 def _is_fresh(path: PurePosixPath, mtime: float) -> bool:

@@ -16,6 +16,9 @@ from bridges.runtime.services import (
     add_root,
     carry_out,
     drop_in_file,
+    not_possible,
+    service_name,
+    services,
     switch_off,
     unit,
 )
@@ -28,11 +31,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the service has stopped and its outputs are off. Return 77 if the user is not
-    root."""
-    name = Path(args.name).name.removesuffix(".yaml")
+    """Return 0 if the service has stopped and its outputs are off. Return 64 if there is no such
+    service, and 77 if the user is not root."""
+    name = service_name(args.name)
     if not INSTANCE.fullmatch(name):
         print(NO_INSTANCE.format(name), file=sys.stderr)
+        return os.EX_USAGE
+    if code := not_possible(args):
+        return code
+    if name not in (known := services(args.root)):
+        there = ", ".join(sorted(known)) or "none"
+        print(f"no service {name}; there is {there}", file=sys.stderr)
         return os.EX_USAGE
     return carry_out(steps(name, args.root), args)
 

@@ -21,12 +21,16 @@ import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Final
+
+from msgspec.structs import replace
 
 from bridges.runtime import drop_in
 from bridges.runtime.services import (
     CONFIG,
     INSTANCE,
     NO_INSTANCE,
+    SYSTEMD,
     GiveSecret,
     Run,
     Step,
@@ -43,6 +47,9 @@ from bridges.settings.cross_file_checks import shared_secrets, taken
 from bridges.settings.load import Config, Problem, SettingsError, load
 from bridges.settings.named_files import SECRETS, named_files
 from bridges.system.directories import GROUPS, user_of
+
+FLEET: Final = "fleet"
+BESIDE: Final = f"a fleet's YAML: write whole paths, or copy both files of RMF to /{CONFIG}"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,6 +73,8 @@ def run(args: argparse.Namespace) -> int:
         return _wrong(error.problems)
     if problems := list(_taken(config, args.root)):
         return _wrong(problems)
+    if of_site := site_problems(config, args.root):
+        return _wrong([*of_site, BESIDE])
     if args.drop_in:
         user = user_of(args.file.stem)
         known = user if user in numbers(args.root / "etc/passwd") else ""
@@ -112,11 +121,35 @@ def _secrets(config: Config, root: Path) -> Iterator[Path]:
             yield path
 
 
-def _taken(config: Config, root: Path) -> Iterator[Problem]:
-    """Yield a problem for each resource or secret that this file shares with another service's file."""
-    all_files = [*_neighbours(root, config.path.stem), config]
-    found = (*taken(all_files), *shared_secrets(all_files))
-    return (problem for problem in found if problem.file == str(config.path))
+def _taken(config: Config, root: Path) -> Iterator[Problem | str]:
+    """Yield a problem for each resource or secret that this file shares with another service's file.
+    Yield advice if that service is disabled."""
+    enabled = {link.name for link in (root / SYSTEMD).glob("*.wants/*")}
+    for other in _neighbours(root, config.path.stem):
+        found = [*taken([other, config]), *shared_secrets([other, config])]
+        yield from found
+        if found and unit(other.path.stem) not in enabled:
+            yield f"{other.path.stem} is disabled: if it is no longer used, move {other.path} away"
+
+
+def site_problems(config: Config, root: Path) -> list[Problem]:
+    """Return the problems of the RMF files that a fleet's YAML names, if the YAML is in
+    /etc/rmf-bridges. `enable` copies the YAML there, and relative paths begin at the YAML's folder."""
+    if config.kind != FLEET:
+        return []
+    from bridges.settings.fleet_site import read_site
+
+    def below_root(file: str) -> str:
+        return str(root / file.lstrip("/")) if file.startswith("/") else file
+
+    section = config.section
+    names = {key: below_root(getattr(section, key)) for key in ("config", "graph")}
+    path = root / CONFIG / f"{config.path.stem}.yaml"
+    try:
+        read_site(replace(config, path=path, section=replace(section, **names)))
+    except SettingsError as error:
+        return list(error.problems)
+    return []
 
 
 def _neighbours(root: Path, name: str) -> Iterator[Config]:
@@ -127,7 +160,7 @@ def _neighbours(root: Path, name: str) -> Iterator[Config]:
                 yield load(file)
 
 
-def _wrong(problems: Iterable[Problem]) -> int:
+def _wrong(problems: Iterable[Problem | str]) -> int:
     for problem in problems:
         print(problem, file=sys.stderr)
     return os.EX_CONFIG

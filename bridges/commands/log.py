@@ -5,22 +5,19 @@ import os
 import shutil
 import sys
 import time
-from pathlib import Path
 from typing import NoReturn
 
 from bridges.runtime.completers import completed_by, device_names, service_names
-from bridges.runtime.daemons import daemons, units
-from bridges.runtime.services import CONFIG
+from bridges.runtime.daemons import daemons
+from bridges.runtime.services import service_name, services, unit
 from bridges.system.directories import runtimes
 from bridges.system.log import pairs
-
-ETC = Path("/") / CONFIG
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `log`."""
     file = parser.add_argument(
-        "file", type=Path, metavar="FILE", help="the device YAML, or its service's name"
+        "file", metavar="FILE", help="the device YAML, or its service's name"
     )
     completed_by(file, service_names)
     parser.add_argument("-f", "--follow", action="store_true", help="keep printing new lines")
@@ -39,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run journalctl in place of this process. Return 69 without a journal, or if the daemon does not
     log to the journal."""
-    name = args.file.stem
+    name = service_name(args.file)
     known = services()
     if name not in known and _runs_by_hand(name):
         print(
@@ -63,12 +60,6 @@ def run(args: argparse.Namespace) -> int:
     return _become(command(args))
 
 
-def services() -> set[str]:
-    """Return the names of this machine's services. Each has a YAML in /etc/rmf-bridges, or a systemd
-    unit."""
-    return {file.stem for file in ETC.glob("*.yaml")} | set(units())
-
-
 def _runs_by_hand(name: str) -> bool:
     found = daemons(runtimes(), {}, time.time())
     return any(one.name == name and one.state in ("serving", "old") for one in found)
@@ -81,7 +72,7 @@ def _become(words: list[str]) -> NoReturn:
 
 def command(args: argparse.Namespace) -> list[str]:
     """Return the journalctl command line."""
-    words = ["journalctl", f"--unit=rmf-bridge@{args.file.stem}", f"--lines={args.lines}"]
+    words = ["journalctl", f"--unit={unit(service_name(args.file))}", f"--lines={args.lines}"]
     words += ["--output=json"] if args.json else ["--output=short-iso", "--no-hostname"]
     words += ["--follow"] if args.follow else []
     words += [f"--since={args.since}"] if args.since else []

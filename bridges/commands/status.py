@@ -18,6 +18,7 @@ import msgspec
 from bridges.messages.words import printable
 from bridges.runtime.daemons import NONE, DaemonStatus, daemons, units
 from bridges.runtime.faults import Remedy, here, remedies, values
+from bridges.runtime.services import service_name
 from bridges.runtime.subject import Status
 from bridges.system.directories import runtimes
 from bridges.system.paint import bold, red
@@ -59,20 +60,22 @@ def run(args: argparse.Namespace) -> int:
     """Return 0 if all daemons serve, 1 for faults, 2 if a daemon died or is silent, and 3 if this user
     sees no daemon.
 
-    With `--idle`, return 0 if no device is in use, and 4 if a device is in use.
+    With `--idle`, return 0 if no device is in use, and 4 if a device is in use. A named daemon that
+    does not exist is not idle, so the result is 3.
     """
     folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
         there = [one.name for one in found if one.state != "stopped" or one.unit]
-        found = [one for one in found if one.name == Path(args.name).stem]
+        name = service_name(args.name)
+        found = [one for one in found if one.name == name]
         if there and not found:
-            print(f"no daemon {Path(args.name).stem}; there is {', '.join(there)}", file=sys.stderr)
+            print(f"no daemon {name}; there is {', '.join(there)}", file=sys.stderr)
             if not args.json:
                 return NONE
     else:  # leave out stopped daemons that a person started by hand
         found = [one for one in found if one.state != "stopped" or one.unit]
-    if args.idle:
+    if args.idle and (found or not (args.name or args.runtime_dir)):
         return _tell_use(found)
     if args.json:
         print(json.dumps([{**msgspec.to_builtins(one), "level": one.level} for one in found]))

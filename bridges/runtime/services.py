@@ -10,14 +10,16 @@ import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Final
 
+from bridges.runtime.daemons import UNIT, units
 from bridges.runtime.record import PATTERN
 from bridges.system.directories import SERVICE_STATE, SERVICE_USER, user_of
 from bridges.system.files import replace
 
 CONFIG: Final = Path("etc/rmf-bridges")
+SYSTEMD: Final = Path("etc/systemd/system")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 """The pattern of a service's name. It allows only characters that systemd does not escape."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
@@ -35,14 +37,32 @@ def add_root(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dry-run", action="store_true", help="only print the steps")
 
 
+def service_name(text: str) -> str:
+    """Return the name of the service that a person means: `my.lift` for `my.lift`, and for the YAML
+    `config/my.lift.yaml`."""
+    return re.sub(r"\.ya?ml$", "", PurePath(text).name)
+
+
+def services(root: Path = Path("/")) -> set[str]:
+    """Return the names of this machine's services. Each has a YAML in /etc/rmf-bridges, a file of
+    systemd, a record of claimed outputs, or, if the system runs, a systemd unit."""
+    system = root / SYSTEMD
+    links = {*system.glob(f"*.wants/{UNIT}*.service"), *system.glob(f"{UNIT}*.service.d")}
+    names = {link.name.removesuffix(".d")[len(UNIT) :].removesuffix(".service") for link in links}
+    names |= {file.stem for file in (root / CONFIG).glob("*.yaml")}
+    records = (root / SERVICE_STATE.relative_to("/")).glob(f"*/{PATTERN}")
+    names |= {record.parent.name for record in records}
+    return names | set(units()) if root == Path("/") else names
+
+
 def unit(name: str) -> str:
     """Return the full name of the service's unit."""
-    return f"rmf-bridge@{name}.service"
+    return f"{UNIT}{name}.service"
 
 
 def drop_in_file(name: str) -> Path:
     """Return the path of the service's drop-in, relative to the root."""
-    return Path(f"etc/systemd/system/{unit(name)}.d/10-enable.conf")
+    return SYSTEMD / f"{unit(name)}.d/10-enable.conf"
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,13 +138,9 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") 
 
     `keeps`: a systemd unit. If it ran before and a step fails, it is started again.
     """
+    if code := not_possible(args):
+        return code
     live = args.root == Path("/")
-    if live and not args.dry_run and os.geteuid() != 0:
-        print("only root may do that: use sudo, or --dry-run to see the steps", file=sys.stderr)
-        return os.EX_NOPERM
-    if not args.root.is_dir():
-        print(f"{args.root} is not a folder: is the card mounted?", file=sys.stderr)
-        return os.EX_NOINPUT
     ran = keeps and live and not args.dry_run and _did(("systemctl", "--quiet", "is-active", keeps))
     for step in steps:
         if not live and (
@@ -138,6 +154,18 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") 
             if ran:
                 _did(("systemctl", "start", keeps))
             return code
+    return 0
+
+
+def not_possible(args: argparse.Namespace) -> int:
+    """Return 77 if only root may change this system, and 66 if the folder of `--root` is missing.
+    Otherwise return 0."""
+    if args.root == Path("/") and not args.dry_run and os.geteuid() != 0:
+        print("only root may do that: use sudo, or --dry-run to see the steps", file=sys.stderr)
+        return os.EX_NOPERM
+    if not args.root.is_dir():
+        print(f"{args.root} is not a folder: is the card mounted?", file=sys.stderr)
+        return os.EX_NOINPUT
     return 0
 
 

@@ -10,20 +10,21 @@ from bridges.yaml.parsing import YamlFile
 from bridges.yaml.positions import MappingEntry, below
 from bridges.yaml.spelling import either, nearest, unknown
 from bridges.yaml.values import BROKEN, Values
-from drivers.hal import AnyBus
+from drivers.hal import AnyBus, Where
 
 
 class BusRead(Struct, frozen=True):
     """The part of a bus that could be read.
 
     `type` and `hal` are None if the type is missing or wrong. `settings` is BROKEN if the settings are
-    wrong.
+    wrong. `where` is the hardware that the bus uses; None if the bus has a problem.
     """
 
     entry: MappingEntry
     type: str | None = None
     hal: AnyBus | None = None
     settings: object = BROKEN
+    where: Where | None = None
 
     def remarks(self) -> Remarks:
         """Yield a remark on each valid setting of the bus that may be a mistake."""
@@ -50,7 +51,10 @@ def read_bus(
     if name is None:
         return BusRead(entry)
     hal = named.bus_called(name)
-    return BusRead(entry, name, hal, values.make(hal.settings, entry.spot(), ("type",)))
+    before = len(page.problems)
+    settings = values.make(hal.settings, entry.spot(), ("type",))
+    where = hal.where(settings) if len(page.problems) == before else None
+    return BusRead(entry, name, hal, settings, where)
 
 
 def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: YamlFile) -> None:

@@ -38,7 +38,13 @@ from bridges.settings.config import Config
 from bridges.settings.plausible import milliseconds
 from bridges.settings.renamed_keys import read_as_renamed
 from bridges.settings.top import MAPPING, keys_below, owner, top_keys, word
-from bridges.settings.wiring import Use, WiringCheck, note_conflicts, note_unknown_signals
+from bridges.settings.wiring import (
+    Use,
+    WiringCheck,
+    note_conflicts,
+    note_same_places,
+    note_unknown_signals,
+)
 from bridges.yaml.parsing import Problem, SettingsError, YamlFile, compose, read
 from bridges.yaml.positions import MappingEntry, Spot, below, is_none, locate
 from bridges.yaml.spelling import either, unknown
@@ -155,7 +161,8 @@ class _DeviceReading:
             self._read_devices(spot)
             of_rmf = sections["rmf"].spot() if "rmf" in sections else None
             note_alarms(self._page, self._devices, self._rmf, spot, of_rmf)
-        note_conflicts(self._page, self._uses)
+        note_same_places(self._page, self._buses.values())
+        note_conflicts(self._page, self._uses, self._buses)
         self._collect_bus_remarks()
 
     def _read_kind(self, entry: MappingEntry | None) -> None:

@@ -63,7 +63,7 @@ def _edits(text: str, root: MappingNode, old: OldKey) -> Iterator[_Edit]:
     inner = f"{key}: {text[value]}"
     for name in reversed(rest):
         inner = f"{name}: {{{inner}}}"
-    yield _insertion(place, inner, comment)
+    yield _insertion(place, inner, comment + ("\r\n" if "\r\n" in text else "\n"))
 
 
 def _span(node: Node) -> tuple[int, int]:
@@ -84,6 +84,10 @@ def _deepest(root: MappingNode, sections: Sequence[str]) -> tuple[MappingNode, S
 def _cut(text: str, old: OldKey) -> tuple[_Edit, str]:
     """Return the edit that removes a key with its value, and the comment after the value."""
     start, end = _span(old.entry.key)[0], _span(old.entry.value)[1]
+    line = old.entry.key.start_mark.line + 1
+    if _span(old.entry.value)[0] < start:  # an alias, which has the place of its anchor
+        anchor = old.entry.value.start_mark.line + 1
+        raise NeedsHand(f"line {line} takes its value from the anchor (&) on line {anchor}")
     if old.parent.flow_style:
         after = len(text[end:]) - len(text[end:].lstrip(" ,"))
         if text[end + after] != "}":
@@ -93,15 +97,16 @@ def _cut(text: str, old: OldKey) -> tuple[_Edit, str]:
     last = len(text) if last < 0 else last
     behind = text[end:last].rstrip("\r")
     if text[first:start].strip() or (behind.strip() and not behind.lstrip().startswith("#")):
-        raise NeedsHand(f"line {old.entry.key.start_mark.line + 1} has more text than this key")
+        raise NeedsHand(f"line {line} has more text than this key")
     return _Edit(first, min(last + 1, len(text)), ""), behind.rstrip()
 
 
-def _insertion(place: MappingNode, entry: str, comment: str) -> _Edit:
-    """Return the edit that makes `entry` the first entry of this mapping."""
+def _insertion(place: MappingNode, entry: str, behind: str) -> _Edit:
+    """Return the edit that makes `entry` the first entry of this mapping. `behind`: the rest of its
+    line, with the line's end; not used in braces."""
     if place.flow_style:
         at = place.start_mark.index + 1
         return _Edit(at, at, f"{entry}, " if place.value else entry)
     at = place.value[0][0].start_mark.index
     indent = " " * place.value[0][0].start_mark.column
-    return _Edit(at, at, f"{entry}{comment}\n{indent}")
+    return _Edit(at, at, f"{entry}{behind}{indent}")

@@ -198,16 +198,40 @@ class WiringCheck:
             self._page.note(locate(spot, wire.path).key, f"'{name}': {text}")
 
 
-def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
+def note_same_places(page: YamlFile, buses: Iterable[BusRead]) -> None:
+    """Note each bus that uses the hardware of an earlier bus of the file: the same port, pins or
+    gateway.
+
+    Two buses at one HTTP server or MQTT broker are permitted, because they may have different secrets.
+    """
+    first: dict[str, BusRead] = {}
+    for bus in buses:
+        where = bus.where
+        if where and (where.local or where.clients != "many"):
+            other = first.setdefault(where.text, bus)
+            if other is not bus:
+                line = other.entry.key.start_mark.line + 1
+                text = f"'{bus.entry.name}' is {where.text}, as '{other.entry.name}' on line {line}"
+                page.note(bus.entry.key, f"{text}: use one bus for all devices there")
+
+
+def note_conflicts(page: YamlFile, uses: Iterable[Use], buses: Mapping[str, BusRead]) -> None:
     """Note each point that two signals use. The problem is reported at the second use in the file."""
     first: dict[tuple[str, str], Use] = {}
     for use in sorted(uses, key=lambda u: (u.node.start_mark.line, u.node.start_mark.column)):
-        other = first.setdefault((use.bus, use.point), use)
+        other = first.setdefault(_thing(use, buses.get(use.bus)), use)
         if other is not use:
             line = other.node.start_mark.line + 1
             point = use.point if use.written == use.point else f"{use.written} ({use.point})"
             taken = f"{point} is used by {other.user} on line {line}"
             page.note(use.node, f"{taken}: {use.user} needs a point of its own")
+
+
+def _thing(use: Use, bus: BusRead | None) -> tuple[str, str]:
+    """Return the place and the name of the thing that is used. Two buses may have the same place."""
+    if bus and bus.hal and bus.where and (what := bus.hal.place(bus.settings, use.point)):
+        return bus.where.text, what
+    return use.bus, use.point
 
 
 def note_unknown_signals(

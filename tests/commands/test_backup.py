@@ -1,16 +1,20 @@
 """`rmf-bridge backup`: the files that it saves or leaves out, and the content of a restored machine."""
 
+import argparse
 import io
 import os
 import shutil
 import subprocess
 import tarfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 
 from bridges import cli
+from bridges.commands import backup
 from bridges.commands.backup import FRESH_S, PAGE_USERS
 from bridges.runtime.runtime_directory import KEPT
 from bridges.runtime.services import make_user
@@ -65,6 +69,19 @@ def restored(root: Path, file: Path, *options: str) -> int:
 
 def content(root: Path) -> dict[str, str]:
     return {str(p.relative_to(root)): p.read_text() for p in root.rglob("*") if p.is_file()}
+
+
+def as_nobody(code: Callable[[], int]) -> int:
+    """Run this as a user who owns nothing, and return its result, an exit code."""
+    if pid := os.fork():
+        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    try:
+        os.setgroups([])
+        os.setgid(65534)
+        os.setuid(65534)
+        os._exit(code())
+    finally:
+        os._exit(99)
 
 
 MEMORY = f"var/lib/rmf-bridge/door_supervisor/{KEPT}"
@@ -164,6 +181,162 @@ def test_a_second_backup_does_not_overwrite_the_first_and_a_dry_run_writes_nothi
 def test_a_machine_without_files_has_nothing_to_save(tmp_path: Path) -> None:
     assert saved(tmp_path, tmp_path / "backup.tar.gz") == os.EX_NOINPUT
     assert not (tmp_path / "backup.tar.gz").exists()
+
+
+def test_links_are_saved_as_the_files_behind_them(
+    machine: Path, tmp_path: Path, calls: list[list[str]]
+) -> None:
+    config, home = machine / "etc/rmf-bridges", machine / "srv"
+    home.mkdir()
+    (config / "ward.yaml").rename(home / "ward.yaml")
+    (config / "ward.yaml").symlink_to("../../srv/ward.yaml")
+    (home / "ca.pem").write_text("certificate")
+    (config / "ca.pem").symlink_to(home / "ca.pem")
+    (config / "again.pem").hardlink_to(home / "ca.pem")
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == 0
+    assert restored(new, file) == 0
+    after = content(new)
+    for name in ("ward.yaml", "ca.pem", "again.pem"):
+        assert after[f"etc/rmf-bridges/{name}"] == (config / name).read_text()
+    assert calls[-1][-1] == "rmf-bridge@ward.service"
+
+
+def test_what_cannot_be_saved_is_told_and_the_rest_can_be_restored(
+    machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = machine / "etc/rmf-bridges"
+    (tmp_path / "host.pem").touch()
+    (config / "of_host.pem").symlink_to(tmp_path / "host.pem")
+    (config / "dangling.pem").symlink_to("nowhere.pem")
+    (config / "folder").symlink_to(machine / "var")
+    os.mkfifo(config / "pipe")
+    with (config / "core").open("wb") as big:
+        big.truncate(backup.MOST_BYTES + 1)
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == os.EX_NOINPUT
+    assert capsys.readouterr().err.splitlines() == [
+        f"NOT saved: {config}/core: it is larger than 16 MiB",
+        f"NOT saved: {config}/dangling.pem: No such file or directory",
+        f"NOT saved: {config}/folder: it is no regular file",
+        f"NOT saved: {config}/of_host.pem: it is a link that leads out of {machine}",
+        f"NOT saved: {config}/pipe: it is no regular file",
+    ]
+    assert restored(new, file) == 0
+
+
+def test_a_service_whose_yaml_is_a_secret_is_named_at_the_backup_and_at_the_restore(
+    machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    ward = machine / "etc/rmf-bridges/ward.yaml"
+    ward.chmod(0o600)
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == os.EX_DATAERR
+    told = capsys.readouterr()
+    assert "left out, as a secret: /etc/rmf-bridges/ward.yaml" in told.out
+    assert told.err == (
+        "the service rmf-bridge@ward.service cannot be restored from this backup, which lacks"
+        " /etc/rmf-bridges/ward.yaml: copy this file by hand\n"
+    )
+    assert restored(new, file) == os.EX_DATAERR
+    assert capsys.readouterr().err == (
+        "the service rmf-bridge@ward.service is NOT restored, because the backup lacks"
+        " /etc/rmf-bridges/ward.yaml: copy this file, then run rmf-bridge enable"
+        " /etc/rmf-bridges/ward.yaml\n"
+    )
+    assert calls == []
+    shutil.copy(ward, new / "etc/rmf-bridges/ward.yaml")  # a person has copied it
+    assert restored(new, file) == 0
+    assert calls[-1][-1] == "rmf-bridge@ward.service"
+
+
+def test_a_yaml_is_restored_together_with_the_dbc_file_that_it_names(
+    machine: Path, tmp_path: Path, calls: list[list[str]]
+) -> None:
+    config = machine / "etc/rmf-bridges"
+    shutil.copy(ROOT / "drivers/profiles/wiferion.dbc", config / "ours.dbc")
+    _, frames = (ROOT / "drivers/profiles/wiferion.yaml").read_text().split("\nmap:\n")
+    frames = indent(frames.replace("wiferion.dbc", "/etc/rmf-bridges/ours.dbc"), "    ")
+    station = (ROOT / "config/charger_wiferion.yaml").read_text()
+    (config / "ward.yaml").write_text(
+        station.replace("    profile: wiferion\n", f"    map:\n{frames}\n")
+    )
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    assert saved(machine, file) == 0
+    assert restored(new, file) == 0
+    assert calls[-1][-1] == "rmf-bridge@ward.service"
+
+
+@pytest.mark.parametrize("lost", ["", "fleet_tiny.yaml", "fleet_tiny_graph.yaml"])
+def test_a_fleet_is_restored_only_with_the_files_that_it_names(
+    machine: Path,
+    tmp_path: Path,
+    calls: list[list[str]],
+    capsys: pytest.CaptureFixture[str],
+    lost: str,
+) -> None:
+    config = machine / "etc/rmf-bridges"
+    for name in ("fleet_tiny.yaml", "fleet_tiny_graph.yaml"):
+        shutil.copy(ROOT / "config" / name, config)
+    shutil.copy(ROOT / "config/robots_http.yaml", config / "ward.yaml")
+    if lost:
+        (config / lost).unlink()
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    saved(machine, file)
+    assert restored(new, file) == (os.EX_CONFIG if lost else 0)
+    assert (content(new) == {}) == bool(lost)
+    assert lost in capsys.readouterr().err
+
+
+def test_only_root_saves_and_restores_a_running_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    file = tmp_path / "backup.tar.gz"
+    for options in ([], ["--restore"]):
+        assert cli.main(["backup", str(file), *options]) == os.EX_NOPERM
+        assert capsys.readouterr().err.startswith("only root may do that")
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("options", [[], ["--restore"]])
+def test_a_root_that_is_not_mounted_is_reported_and_not_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str]
+) -> None:
+    root, file = tmp_path / "card", tmp_path / "backup.tar.gz"
+    assert cli.main(["backup", str(file), *options, "--root", str(root)]) == os.EX_NOINPUT
+    assert capsys.readouterr().err == f"{root} is not a folder: is the card mounted?\n"
+    assert not root.exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+@pytest.mark.parametrize(
+    ("closed", "mode"),
+    [
+        (str(PAGE_USERS.parent), 0o700),
+        ("var/lib/rmf-bridge/door_supervisor", 0o750),
+        ("var/lib/rmf-bridge", 0o700),
+        ("etc/rmf-bridges", 0o700),
+        ("etc/rmf-bridges/page.env", 0o640),
+        (MEMORY, 0o600),
+    ],
+)
+def test_a_place_that_this_user_may_not_read_is_told_and_no_success(
+    machine: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    closed: str,
+    mode: int,
+) -> None:
+    (machine / PAGE_USERS).chmod(0o644)
+    (machine / closed).chmod(mode)
+    machine.chmod(0o777)
+    monkeypatch.chdir(machine)  # nobody may not reach this folder by its whole path
+    args = argparse.Namespace(file=Path("b.tar.gz"), root=Path(), restore=False, dry_run=False)
+    assert as_nobody(lambda: backup.run(args)) == os.EX_NOINPUT
+    told = capfd.readouterr().err
+    assert f"NOT saved: {closed}: Permission denied\n" in told
+    assert "Traceback" not in told
 
 
 @pytest.mark.parametrize("bytes_left", [0, 40, 200])

@@ -127,8 +127,12 @@ def test_a_card_that_is_not_mounted_is_reported_before_the_first_step(
 
 
 def test_a_dry_run_prints_every_step_and_does_nothing(
-    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    calls: list[list[str]],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(disable, "services", lambda root: {"lift_dry_contact"})
     assert main(["disable", str(LIFT), "--dry-run"]) == 0
     assert main(["enable", str(LIFT), "--root", str(tmp_path), "--dry-run"]) == 0
     printed = capsys.readouterr().out.splitlines()
@@ -165,6 +169,25 @@ def test_pins_of_another_service_are_refused_with_their_place(
     assert [path.name for path in (tmp_path / "etc/rmf-bridges").iterdir()] == [LIFT.name]
 
 
+@pytest.mark.parametrize("enabled", [True, False])
+def test_the_file_of_a_disabled_service_still_blocks_its_pins_but_this_is_told(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str], enabled: bool
+) -> None:
+    main(["enable", str(LIFT), "--root", str(tmp_path)])
+    if enabled:  # the test's systemctl makes no link
+        link = tmp_path / "etc/systemd/system/rmf-bridges.target.wants" / UNIT
+        link.parent.mkdir()
+        link.symlink_to("/usr/lib/systemd/system/rmf-bridge@.service")
+    other = CONFIG / "lift_relay_board.yaml"
+    assert main(["enable", str(other), "--root", str(tmp_path)]) == os.EX_CONFIG
+    told = capsys.readouterr().err
+    assert f" is used in {tmp_path / TARGET} too" in told
+    advice = (
+        f"lift_dry_contact is disabled: if it is no longer used, move {tmp_path / TARGET} away\n"
+    )
+    assert told.endswith(advice) != enabled
+
+
 @pytest.mark.parametrize("name", ["my lift.yaml", "-x.yaml", "a@b.yaml", "%i.yaml"])
 def test_a_file_that_cannot_name_a_service_is_refused(
     tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
@@ -185,6 +208,37 @@ def test_only_root_changes_a_running_system(
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     assert main(["enable", str(LIFT)]) == os.EX_NOPERM
     assert main(["disable", "lift_dry_contact"]) == os.EX_NOPERM
+    assert calls == []
+
+
+@pytest.mark.parametrize(
+    "left",
+    [
+        "etc/rmf-bridges/my.lift.yaml",
+        "etc/systemd/system/rmf-bridge@my.lift.service.d/10-enable.conf",
+        "etc/systemd/system/rmf-bridges.target.wants/rmf-bridge@my.lift.service",
+        "var/lib/rmf-bridge/my.lift/claimed-1.json",
+    ],
+)
+@pytest.mark.parametrize("name", ["my.lift", "/x/my.lift.yaml", "my.lift.yml"])
+def test_a_service_with_one_file_left_can_be_disabled(
+    tmp_path: Path, calls: list[list[str]], left: str, name: str
+) -> None:
+    (tmp_path / left).parent.mkdir(parents=True)
+    (tmp_path / left).touch()
+    assert main(["disable", name, "--root", str(tmp_path)]) == 0
+    assert calls == [["systemctl", f"--root={tmp_path}", "disable", "rmf-bridge@my.lift.service"]]
+
+
+def test_the_name_of_no_service_is_refused_with_the_known_names(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = ["--root", str(tmp_path)]
+    main(["enable", str(LIFT), *root])
+    calls.clear()
+    assert main(["disable", "lift_dry", *root]) == os.EX_USAGE
+    assert capsys.readouterr().err == "no service lift_dry; there is lift_dry_contact\n"
+    assert main(["disable", "lift_dry", *root, "--dry-run"]) == os.EX_USAGE
     assert calls == []
 
 
@@ -259,6 +313,41 @@ def test_two_services_cannot_have_one_secret(
     told = capsys.readouterr().err
     wanted = f"/etc/rmf-bridges/relay.key is the secret of {tmp_path}/etc/rmf-bridges/ward.yaml too"
     assert f"{second}:15:17: {wanted}: give each service a copy" in told
+
+
+def site(folder: Path) -> Path:
+    """Copy a fleet's YAML and the two files of RMF to a new folder. Return the YAML."""
+    folder.mkdir(parents=True)
+    for name in ("robots_http.yaml", "fleet_tiny.yaml", "fleet_tiny_graph.yaml"):
+        (folder / name).write_bytes((CONFIG / name).read_bytes())
+    return folder / "robots_http.yaml"
+
+
+def test_a_fleet_whose_files_would_be_missing_is_refused_before_the_first_step(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = tmp_path / "root"
+    root.mkdir()
+    file = site(tmp_path / "site")
+    assert main(["enable", str(file), "--root", str(root)]) == os.EX_CONFIG
+    *told, advice = capsys.readouterr().err.splitlines()
+    target = root / "etc/rmf-bridges"
+    for line, name in {12: "fleet_tiny.yaml", 13: "fleet_tiny_graph.yaml"}.items():
+        assert f"{target}/robots_http.yaml:{line}:3: {target}/{name} cannot be read" in told
+    assert advice == enable.BESIDE
+    assert (calls, list(root.iterdir())) == ([], [])
+
+
+def test_a_fleet_is_enabled_with_its_files_beside_it_or_by_whole_paths(
+    tmp_path: Path, calls: list[list[str]]
+) -> None:
+    beside, whole = tmp_path / "beside", tmp_path / "whole"
+    site(beside / "etc/rmf-bridges")
+    file = site(tmp_path / "site")
+    assert main(["enable", str(file), "--root", str(beside)]) == 0
+    site(whole / "srv")
+    file.write_text(file.read_text().replace(" fleet_tiny", " /srv/fleet_tiny"))
+    assert main(["enable", str(file), "--root", str(whole)]) == 0
 
 
 def test_a_packages_upgrade_keeps_the_services_user(

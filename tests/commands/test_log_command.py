@@ -34,13 +34,18 @@ def command(*words: str) -> list[str]:
 def test_log_asks_the_journal_for_the_unit_of_this_file() -> None:
     assert command("config/lift_a.yaml", "-f", "-n", "5", "--since", "today") == [
         "journalctl",
-        "--unit=rmf-bridge@lift_a",
+        "--unit=rmf-bridge@lift_a.service",
         "--lines=5",
         "--output=short-iso",
         "--no-hostname",
         "--follow",
         "--since=today",
     ]
+
+
+@pytest.mark.parametrize("name", ["my.lift", "config/my.lift.yaml", "/etc/my.lift.yml"])
+def test_a_service_may_have_a_dot_in_its_name(name: str) -> None:
+    assert command(name)[1] == "--unit=rmf-bridge@my.lift.service"
 
 
 @pytest.mark.parametrize(
@@ -87,4 +92,4 @@ def test_an_unknown_service_is_reported_before_the_lines_of_the_journal(tmp_path
         check=True,
     )
     assert told.stderr.startswith("no_such_lift is not a service here (services: ")
-    assert told.stdout == "asked for --unit=rmf-bridge@no_such_lift\n"
+    assert told.stdout == "asked for --unit=rmf-bridge@no_such_lift.service\n"

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from bridges import cli
+from bridges.commands import status
 from bridges.commands.status import IN_USE, show, users
 from bridges.kinds import kind_names
 from bridges.runtime import daemons as on_machine
@@ -253,6 +254,16 @@ def test_each_fault_has_a_remedy_and_each_remedy_belongs_to_a_fault() -> None:
     assert known - named - constants - hazards == set()
 
 
+@pytest.mark.parametrize("name", ["my.lift", "config/my.lift.yaml", "my.lift.yml"])
+def test_a_daemon_with_a_dot_in_its_name_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "rmf-bridge").mkdir()
+    with served(tmp_path / "rmf-bridge" / "my.lift", lift()):
+        assert cli.main(["status", name]) == WELL
+
+
 def test_an_unknown_name_is_answered_with_the_known_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -302,6 +313,26 @@ def test_the_users_of_a_daemon_that_does_not_serve_are_not_known(state: str) -> 
     assert list(users(one)) == [
         "one: it does not serve, so nobody knows whether its devices are in use"
     ]
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_a_named_daemon_that_does_not_exist_is_not_idle(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    others: int,
+) -> None:
+    monkeypatch.setattr(status, "units", dict)
+    with served(tmp_path / "lift_a", lift()) as folder:
+        monkeypatch.setattr(status, "runtimes", lambda: [folder][:others])
+        for line in (["ghost"], ["--runtime-dir", str(tmp_path / "ghost")]):
+            assert cli.main(["status", "--idle", *line]) == NONE
+            told = capsys.readouterr()
+            assert "no daemon" in told.out + told.err
+            assert "idle" not in told.out
+        assert (
+            cli.main(["status", "--idle"]) == 0
+        )  # also on a machine without daemons, for a rollout
 
 
 def test_idle_is_an_exit_code_for_a_rollout(

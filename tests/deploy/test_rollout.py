@@ -6,6 +6,7 @@
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from hashlib import sha256
@@ -15,6 +16,7 @@ from typing import Any, Final
 import pytest
 import yaml
 
+from bridges import cli
 from bridges.kinds import kind_names
 from bridges.settings.load import load
 from workbench.commissioning.doctor.finding import ok
@@ -130,20 +132,63 @@ def test_every_kind_has_a_role_and_needs_a_kill_test_if_it_has_outputs() -> None
     assert set(kind_names()) == rollout.SERVED
 
 
+BROKEN: Final = {
+    "misspelt": "kind: lfit\n",
+    "no_value": "kind:\n",
+    "no_word": "kind: [lift]\n",
+    "other_key": "knid: lift\nbuses: {}\n",
+    "unparsable": "kind: lift\nlifts: {\n",
+    "two_texts": "kind: lift\n---\nkind: door\n",
+    "empty": "",
+    "text": "lift\n",
+}
+"""Device YAMLs that no service can run. `rmf-bridge check` refuses them, so they must reach it."""
+
+
 def test_a_folder_is_sorted_by_kind(tmp_path: Path) -> None:
     for kind in ("lift", "alarm", "door_supervisor"):
         (tmp_path / f"{kind}.yaml").write_text(f"kind: {kind}\n")
     (tmp_path / "profile.yaml").write_text("registers: {}\n")
+    for name, text in BROKEN.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
 
     def names(files: list[str]) -> list[str]:
         return [Path(file).stem for file in files]
 
-    assert names(rollout.rmf_files(str(tmp_path))) == ["alarm", "door_supervisor", "lift"]
+    served = ["alarm", "door_supervisor", "lift"]
+    assert names(rollout.rmf_files(str(tmp_path))) == sorted([*served, *BROKEN])
     assert names(rollout.rmf_files(str(tmp_path), "daemon")) == ["alarm", "lift"]
     assert names(rollout.rmf_files(str(tmp_path), "supervisors")) == ["door_supervisor"]
     assert names(rollout.rmf_files(str(tmp_path), "outputs")) == ["lift"]
     assert names(rollout.rmf_beside(str(tmp_path))) == ["profile"]
     assert "there is no form" in rollout.rmf_untested_file(str(tmp_path / "lift.yaml"))
+
+
+def test_check_refuses_each_broken_file_and_no_role_copies_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in BROKEN.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    for file in rollout.rmf_files(str(tmp_path)):
+        assert cli.main(["check", "-q", file]) == os.EX_CONFIG
+        assert file in capsys.readouterr().err
+    assert rollout.rmf_beside(str(tmp_path)) == []
+    assert [rollout.rmf_files(str(tmp_path), role) for role in rollout.ROLES] == [[], [], []]
+
+
+@pytest.mark.parametrize("name", ["lift.yml", "lift.YAML"])
+def test_a_file_with_a_name_that_no_service_has_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("kind: lift\n")
+    for sort in (rollout.rmf_files, rollout.rmf_beside):
+        with pytest.raises(ValueError, match=f"{name}: a service's file ends with .yaml"):
+            sort(str(tmp_path))
+
+
+def test_every_shipped_profile_and_map_is_beside_and_every_device_yaml_is_none() -> None:
+    top = COLLECTION.parents[1]
+    assert len(rollout.rmf_beside(str(top / "drivers/profiles"))) > 3
+    beside = [Path(file).name for file in rollout.rmf_beside(str(top / "config"))]
+    assert beside == ["fleet_tiny.yaml", "fleet_tiny_graph.yaml"]
 
 
 def test_one_machine_is_changed_at_a_time_after_all_were_looked_at() -> None:
@@ -163,6 +208,58 @@ def test_nothing_is_changed_before_the_devices_are_idle_and_the_old_version_is_k
     assert change["block"][0]["ignore_unreachable"]  # else `rescue` would be passed over
     assert [*change["rescue"][-1]] == ["name", "ansible.builtin.fail"]
     assert change["rescue"][-2]["ansible.builtin.include_tasks"] == "put_back.yml"
+
+
+def script(file: str, name: str, root: Path) -> str:
+    """Return the shell script of a task, for a machine whose root is this folder."""
+    tasks = yaml.safe_load((COLLECTION / "playbooks/tasks" / file).read_text())
+    text = str(*(task["ansible.builtin.shell"] for task in tasks if task["name"] == name))
+    text = text.replace("{{ rmf_served | map('quote') | join(' ') }}", "ward")
+    text = text.replace("{{ rmf_old.stdout }}", "0.1.0").replace("tar -C / ", f"tar -C {root} ")
+    for folder in ("/etc/", "/var/", "/run/"):
+        text = re.sub(rf"(?<![\w$/]){folder}", f"{root}{folder}", text)
+    return text
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o644])
+def test_each_old_file_comes_back_even_a_secret_and_only_new_services_are_removed(
+    tmp_path: Path, mode: int
+) -> None:
+    root, programs = tmp_path / "root", tmp_path / "bin"
+    config, new = root / "etc/rmf-bridges", root / "run/rmf-bridges-rollout"
+    for folder in (programs, config, new, root / "var/backups"):
+        folder.mkdir(parents=True)
+    for name in ("systemctl", "apt-get", "dpkg", "dpkg-query", "timeout", "rmf-bridge"):
+        (programs / name).write_text(f'#!/bin/sh\necho "{name} $*" >> {tmp_path}/calls\n')
+        (programs / name).chmod(0o755)
+    with (programs / "rmf-bridge").open("a") as out:
+        out.write(
+            'if [ "$1" = backup ]; then exit 65; fi\nif [ "$1" = status ]; then echo []; fi\n'
+        )
+    (config / "ward.yaml").write_text("old")
+    (config / "ward.yaml").chmod(mode)
+
+    def run(file: str, name: str) -> None:
+        env = os.environ | {"PATH": f"{programs}:{os.environ['PATH']}"}
+        words = ["sh", "-c", script(file, name, root)]
+        done = subprocess.run(words, env=env, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+    run("change.yml", "Keep the old version and the old configuration")
+    kept = root / "var/backups/rmf-bridges-rollout/files.tar.gz"
+    assert kept.stat().st_mode & 0o777 == 0o600
+    (tmp_path / "calls").unlink()
+    for name in ("ward", "lab"):  # `lab` is a new service
+        for folder in (config, new):
+            (folder / f"{name}.yaml").write_text("new")
+    run("put_back.yml", "Put the old files and packages back")
+    assert {path.name: path.read_text() for path in config.iterdir()} == {"ward.yaml": "old"}
+    assert (config / "ward.yaml").stat().st_mode & 0o777 == mode
+    calls = (tmp_path / "calls").read_text().splitlines()
+    assert [one for one in calls if one.startswith("rmf-bridge ")] == [
+        "rmf-bridge disable lab",
+        f"rmf-bridge enable {config}/ward.yaml",
+    ]
 
 
 def test_ansible_reads_the_playbook(tmp_path: Path) -> None:

@@ -130,6 +130,29 @@ def test_a_key_in_braces_is_cut_out_with_its_comma(old: Path, place: str) -> Non
     assert rewritten(old).endswith(f"    map: {{{inner}}}   # all of it\n")
 
 
+def test_a_key_whose_value_is_an_alias_is_left_to_a_person(
+    old: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    anchor = "    limits: {start_timeout_s: &two 2}\n"
+    text = HEAD + BAY.replace("    map:", f"{anchor}    map:").replace("_s: 2  ", "_s: *two  ")
+    old.write_text(text + MAP)
+    assert cli.main(["migrate", str(old)]) == os.EX_DATAERR
+    told = capsys.readouterr().err
+    assert (
+        f"{old} must be changed by hand: line 11 takes its value from the anchor (&) on line 9"
+        in told
+    )
+    assert old.read_text() == text + MAP
+
+
+def test_a_file_with_crlf_keeps_it_on_each_line(old: Path) -> None:
+    old.write_bytes((HEAD + BAY + MAP).replace("\n", "\r\n").encode())
+    rewritten(old)
+    lines = old.read_bytes().split(b"\n")
+    assert [line for line in lines[:-1] if not line.endswith(b"\r")] == []
+    assert b"    limits: {peer_internal_timeout_s: 2}   # asked of the maker\r" in lines
+
+
 def test_both_names_together_are_refused_at_the_old_name(old: Path) -> None:
     text = HEAD + BAY.replace("    map:", "    limits: {peer_internal_timeout_s: 3}\n    map:")
     wrong = "'stops_unfed_s' is the old name of 'peer_internal_timeout_s', which the file has too"

@@ -30,7 +30,13 @@ from workbench.graph.board import (
     repaint,
     table,
 )
-from workbench.graph.join import add_graph_arguments, complain, interruptible, open_graph
+from workbench.graph.join import (
+    add_graph_arguments,
+    complain,
+    interruptible,
+    open_graph,
+    seconds,
+)
 from workbench.graph.live import Ear
 
 REDRAW_S = 0.5
@@ -42,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_graph_arguments(parser)
     parser.add_argument(
         "--once",
-        type=float,
+        type=seconds(0.1, 86400),
         nargs="?",
         const=3.0,
         metavar="SECONDS",
@@ -89,9 +95,9 @@ def listen_on(transport: Transport) -> Ear:
     return Ear(transport, shown)
 
 
-def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -> int:
-    """Listen for `seconds`, and print the table or JSON. Return 0. Return 1 if nothing was heard."""
-    board, until = Board(), time.monotonic() + seconds
+def show_once(ear: Ear, for_s: float, out: TextIO, *, as_json: bool = False) -> int:
+    """Listen for `for_s` (s), and print the table or JSON. Return 0. Return 1 if nothing was heard."""
+    board, until = Board(), time.monotonic() + for_s
     while (left_s := until - time.monotonic()) > 0:
         for heard in ear.listen(left_s):
             board.take(heard)

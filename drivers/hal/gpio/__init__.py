@@ -45,6 +45,11 @@ __all__ = [
 ]
 
 
+HEADER_CHIPS = (None, 0, 4)
+"""The settings of `chip` that mean the header. On a Raspberry Pi 5 the header is gpiochip4 with kernels
+before 6.6.45, and then gpiochip0, with gpiochip4 as a link to it. On every other Pi it is gpiochip0."""
+
+
 class GpioSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="gpio"):
     """The header's pins."""
 
@@ -58,7 +63,8 @@ class GpioSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 def where(settings: GpioSettings) -> Where:
     """Return the hardware that the bus uses: the header, or another chip."""
-    return Where("the header" if settings.chip is None else f"gpiochip{settings.chip}", local=True)
+    chip = settings.chip
+    return Where("the header" if chip in HEADER_CHIPS else f"gpiochip{chip}", local=True)
 
 
 def needs(settings: GpioSettings) -> Needs:

@@ -227,7 +227,8 @@ def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -
 def place(settings: MqttSettings, point: str) -> str | None:
     """Return a text that names a relay's command, because no other device YAML may send the same
     command. Return None for a state, because every device YAML may read a state."""
-    command = settings.wholes()[point].command
+    whole = settings.wholes().get(point)
+    command = whole.command if whole else None
     return f"the command {command.topic} {command.payload_on}" if command else None
 
 

@@ -158,6 +158,25 @@ def test_the_watch_tells_also_that_nothing_moved_or_was_heard(
     assert aftermath(states) == text
 
 
+@pytest.mark.parametrize(
+    ("state", "hint"),
+    [
+        (
+            GRANTED,
+            f"Lift1 is held by {ME}, not by wrong; to end the present session:"
+            f" rmf-bridge release Lift1 --session {ME}",
+        ),
+        (LIFT, "Lift1 is held by nobody, not by wrong"),
+    ],
+)
+def test_without_a_supervisor_a_wrong_session_is_answered_with_the_holder(
+    state: d.LiftState, hint: str
+) -> None:
+    wrong = dataclasses.replace(RELEASE, session="wrong")
+    sent, hints, _ = told(wrong, [state] * 11, boarded="", listeners=0)
+    assert (sent, hints) == ([], [hint])
+
+
 def test_without_a_supervisor_a_person_must_look_into_a_car_that_may_hold_a_robot() -> None:
     _, hints, _ = told(RELEASE, [GRANTED] * 11, boarded="", listeners=0)
     assert hints == [

@@ -261,6 +261,17 @@ def test_once_listens_for_three_seconds_unless_told_otherwise(
     assert parser.parse_args(line).once == seconds
 
 
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "inf", "x"])
+def test_a_time_in_which_nothing_can_be_heard_is_a_usage_error(
+    seconds: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    parser = argparse.ArgumentParser()
+    watch.add_arguments(parser)
+    with pytest.raises(SystemExit, match="2"):
+        parser.parse_args([f"--once={seconds}"])
+    assert f"--once: '{seconds}': write 0.1 to 86400 seconds" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("domain", ["-1", "233", "x", "1.5"])
 def test_an_impossible_domain_is_a_usage_error(domain: str) -> None:
     parser = argparse.ArgumentParser()

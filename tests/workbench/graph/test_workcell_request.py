@@ -73,9 +73,23 @@ def test_another_result_is_no_outcome(other: d.DispenserResult) -> None:
     assert "lists request mine, and gives no result yet" in ran.outcome.text
 
 
-def test_an_offline_workcell_names_the_command_that_decides() -> None:
-    ran = tell(ASK, [(n / 2, state(2, "mine")) for n in range(20)])
-    assert "rmf-bridge workcell" in str([*ran.hints, ran.outcome])
+@pytest.mark.parametrize(
+    ("told", "command"),
+    [
+        ({"MEMORY_LOST": ""}, "rmf-bridge workcell done, again or failed"),
+        ({"OUTCOME_UNKNOWN": "mine"}, "rmf-bridge workcell done, again or failed"),
+        ({"WORKCELL_HALTED": "theirs has failed: jam"}, "rmf-bridge reset FILE"),
+        ({"COMMUNICATION_LOST": ""}, "rmf-bridge status on"),
+        ({}, "rmf-bridge status on"),
+    ],
+)
+def test_an_offline_workcell_names_the_command_that_helps(
+    told: dict[str, str], command: str
+) -> None:
+    ran = tell(ASK, [(n / 2, state(2, "mine")) for n in range(20)], told=told)
+    text = str([*ran.hints, ran.outcome])
+    assert command in text
+    assert ("workcell done" in text) == ("workcell done" in command)
 
 
 def test_an_ingestor_is_asked_with_its_own_messages_and_may_be_asked_for_nothing() -> None:

@@ -177,6 +177,11 @@ class LiftEnd(_Lift):
         found = super(LiftEnd, self).nobody(seen)
         if self.direct or not self.falls_back or not seen.states:
             return found
+        holder = seen.states_of(d.LiftState)[-1].session_id
+        if holder != self._ending(seen):
+            text = f"{self.name} is held by {holder or 'nobody'}, not by {self._ending(seen)}"
+            there = self.line.other("release", self.name, "--session", holder)
+            return Obstacle(True, text, f"to end the present session: {there}" if holder else "")
         if self._outside(seen):
             return found._replace(remedy="the lift's own daemon is asked instead")
         return found._replace(remedy=f"if the car is empty: {self.line.again_with('--car-empty')}")

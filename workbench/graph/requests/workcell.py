@@ -12,9 +12,14 @@ from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, Reque
 TELLS_S = 2.5
 """Maximum time (s) from a result until the workcell's daemon gives the reason for the result.
 Diagnostics come each second."""
-DECIDE = (
-    "run rmf-bridge status, then rmf-bridge workcell done, again or failed, on its daemon's machine"
-)
+LOOK = "run rmf-bridge status on its daemon's machine"
+DECIDE = f"{LOOK}, then rmf-bridge workcell done, again or failed"
+REMEDIES = {
+    "MEMORY_LOST": DECIDE,
+    "OUTCOME_UNKNOWN": DECIDE,
+    "WORKCELL_HALTED": "clear the workcell, then run rmf-bridge reset FILE on its daemon's machine",
+}
+"""What a person can do about a workcell that is offline with this fault."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +78,7 @@ class Dispensing(Request):
             Obstacle(
                 state.mode == d.WorkcellMode.OFFLINE,
                 f"{self.name} is offline; request {self.guid} {'waits' if listed else 'is not listed'}",
-                DECIDE,
+                next((REMEDIES[code] for code in REMEDIES if code in seen.told), LOOK),
             ),
             Obstacle(not listed, f"{self.name} does not list request {self.guid}"),
             Obstacle(True, f"{self.name} lists request {self.guid}, and gives no result yet"),

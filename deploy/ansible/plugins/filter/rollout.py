@@ -15,35 +15,51 @@ DEVICES: Final = frozenset({"lift", "door", "charger", "dispenser", "ingestor"})
 NO_OUTPUTS: Final = frozenset({"alarm", "fleet"})
 SUPERVISORS: Final = frozenset({"lift_supervisor", "door_supervisor", "charger_coordinator"})
 SERVED: Final = DEVICES | NO_OUTPUTS | SUPERVISORS
+TOP: Final = frozenset({"kind", "driver", "buses", "rmf"})
+"""Keys at the top of a device YAML. No profile and no map has one."""
+SUFFIXES: Final = (".yaml", ".yml")
 NAMED: Final = re.compile(r"\+(deb|ubuntu)[0-9.]+$")
 ROLES: Final = {"daemon": DEVICES | NO_OUTPUTS, "supervisors": SUPERVISORS, "outputs": DEVICES}
 
 
-def rmf_kind(text: str) -> str:
-    """Return the kind of a YAML. Return "" for a profile, a map or another file that no service
-    runs."""
+def rmf_kind(text: str) -> str | None:
+    """Return the kind of a YAML, which may be no kind of ours. Return None for a profile, a map or
+    another file that no service runs.
+
+    Return "" if the kind is missing although this seems to be a device YAML, and if the text is no
+    mapping. `rmf-bridge check` refuses such a file, so the rollout does not copy it.
+    """
     try:
         content = yaml.safe_load(text)
     except yaml.YAMLError:
         return ""
-    kind = content.get("kind", "") if isinstance(content, dict) else ""
-    return kind if kind in SERVED else ""
+    if not isinstance(content, dict):
+        return ""
+    return None if TOP.isdisjoint(content) else str(content.get("kind", ""))
 
 
 def rmf_files(folder: str, role: str = "") -> list[str]:
     """Return the YAMLs in this folder for which this Ansible role makes a service. If no role is given,
-    return every YAML that has a service."""
-    kinds = ROLES.get(role, SERVED)
-    return [str(file) for file in _yamls(folder) if rmf_kind(file.read_text("utf-8")) in kinds]
+    return every YAML that is no profile or map: `rmf-bridge check` must accept each of them."""
+    return [
+        str(file)
+        for file, kind in _yamls(folder)
+        if (kind in ROLES[role] if role else kind is not None)
+    ]
 
 
 def rmf_beside(folder: str) -> list[str]:
     """Return the YAMLs in this folder that have no service, which are profiles and maps."""
-    return [str(file) for file in _yamls(folder) if not rmf_kind(file.read_text("utf-8"))]
+    return [str(file) for file, kind in _yamls(folder) if kind is None]
 
 
-def _yamls(folder: str) -> list[Path]:
-    return sorted(Path(folder).glob("*.yaml"))
+def _yamls(folder: str) -> list[tuple[Path, str | None]]:
+    """Return each YAML with its kind. Raises ValueError for a name that would be passed over."""
+    found = sorted(file for file in Path(folder).glob("*") if file.suffix.lower() in SUFFIXES)
+    for file in found:
+        if file.suffix != ".yaml":
+            raise ValueError(f"{file}: a service's file ends with .yaml: rename it")
+    return [(file, rmf_kind(file.read_text("utf-8", "replace"))) for file in found]
 
 
 def rmf_untested(form: str, file: str, content: bytes) -> str:
