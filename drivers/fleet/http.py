@@ -67,7 +67,7 @@ class FleetCalls(Protocol):
         """Send one request, without retry. Raises HalError."""
 
     def ask(
-        self, path: str, method: http.Method = "POST", body: str | None = None
+        self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
     ) -> dict[str, object]:
         """Send one request, without retry, and return its answer. Raises HalError."""
 
@@ -166,6 +166,7 @@ class HttpRobot:
             paused=flag("paused"),
             refused=self._refused,
             unanswered=self._unanswered,
+            taken=(0, 0) if self._refused else self._sent,
         )
 
     def _path(self, answer: Answer, level: str) -> tuple[Pose, ...]:
@@ -238,10 +239,11 @@ class HttpRobot:
         given = values(self._settings.theirs(command), self._robot, self._api.units)
         path = path_with(call.path, given)
         body = None if call.body is None else body_with(call.body, given)
+        safe = command.doing in ("stop", "pause")
         if self._api.accepted is None:
-            self._bus.send(path, call.method, body, safe=command.doing in ("stop", "pause"))
+            self._bus.send(path, call.method, body, safe=safe)
             return ""
-        answer = self._bus.ask(path, call.method, body)
+        answer = self._bus.ask(path, call.method, body, safe=safe)
         if json_fields.flag(answer, self._api.accepted):
             return ""
         why = json_fields.clean(str(answer.get("msg") or ""))

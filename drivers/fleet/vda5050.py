@@ -9,12 +9,15 @@
 
 A robot accepts a new order only when it has no order. So the driver cancels an order before it sends
 another one. The robot reports `cancelOrder` as finished when all movement has stopped. `driving` is
-false then too.
+false then too. If the robot has no order, it reports `cancelOrder` as failed.
+
+Messages have QoS 0, so a message can get lost, and a robot may act on it late. Therefore a stop or
+pause counts as taken only when the robot reports it as finished.
 """
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import Meta
@@ -25,8 +28,9 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers import DriverError
 from drivers.driver_type import DriverType
-from drivers.fleet.vda_messages import DIALECTS, Json, Version, action, order
+from drivers.fleet.vda_messages import DIALECTS, Json, Version, action, order, order_id
 from drivers.fleet.vda_state import (
+    ended,
     errors,
     flag,
     has_order,
@@ -44,6 +48,12 @@ from drivers.hal.mqtt import Heard, MqttBus, MqttSettings
 from drivers.hal.timestamps import utc
 from drivers.json_fields import clean
 
+INSTANT_COMMANDS: Final[Mapping[str, str]] = {
+    "stop": "cancelOrder",
+    "pause": "startPause",
+    "resume": "stopPause",
+}
+"""The instant actions for commands of the core."""
 Age = Annotated[float, Meta(ge=1, le=120, extra={"unit": "s"})]
 TopicPart = Annotated[
     str,
@@ -116,6 +126,7 @@ class VdaRobot:
         self._topics = {topic: settings.topic(topic, name) for topic in topics}
         self._serial = settings.known_as or name
         self._sent, self._acts = (0, 0), False
+        self._order_id = self._instant_id = ""
         self._headers = dict.fromkeys(topics, 0)
         self._state: Json = {}
         self._at: Pose | None = None
@@ -153,6 +164,7 @@ class VdaRobot:
             refused=self._refused(state),
             path=self._path(state),
             paused=flag(state, "paused") if "paused" in state else None,
+            taken=self._sent if self._taken(state) else (0, 0),
         )
 
     def write(self, outputs: RobotOutputs) -> None:
@@ -161,11 +173,10 @@ class VdaRobot:
         command = outputs.command and self._settings.theirs(outputs.command)
         if command is None or self._sent == (command.id, command.attempt):
             return
-        if command.doing == "stop":
-            self._cancel(command.attempt)
-        elif command.doing in ("pause", "resume"):
-            kind = "startPause" if command.doing == "pause" else "stopPause"
-            self._instant(kind, f"{command.doing}-{command.id}-{command.attempt}-{utc()}", {})
+        self._connected()
+        if command.doing in INSTANT_COMMANDS:
+            self._instant_id = f"{command.doing}-{command.id}-{command.attempt}-{utc()}"
+            self._instant(INSTANT_COMMANDS[command.doing], self._instant_id, {})
         elif command.doing == "localize":
             self._localize(command)
         elif not has_order(self._state):
@@ -183,8 +194,7 @@ class VdaRobot:
     def make_safe(self) -> None:
         """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the
         robot finishes its order."""
-        kinds = {"stop": "cancelOrder", "pause": "startPause"}
-        if kind := kinds.get(self._settings.on_death):
+        if kind := INSTANT_COMMANDS.get(self._settings.on_death):
             self._instant(kind, f"on-death-{utc()}", {})
 
     def close(self) -> None:
@@ -287,6 +297,18 @@ class VdaRobot:
             found += [f"the action {clean(str(a.get('actionType')))} has failed" for a in failed]
         return "; ".join(found)
 
+    def _taken(self, state: Json) -> bool:
+        """Does the state show that the robot has received the last stop or pause?
+
+        A robot that reports a stop as failed has no order. If the state does not show the last order
+        yet, the order may still be on its way, so only a second such report counts.
+        """
+        how = ended(state, self._instant_id)
+        if self._instant_id.startswith("pause-"):
+            return how == "FINISHED" or (how == "FAILED" and state.get("paused") is True)
+        knows_order = self._sent[1] > 1 or text(state, "orderId") == self._order_id
+        return not has_order(state) and (how == "FINISHED" or (how == "FAILED" and knows_order))
+
     def _cancel(self, attempt: int) -> None:
         """Cancel the robot's order, once for each attempt."""
         cancelled = (text(self._state, "orderId"), attempt)
@@ -322,13 +344,15 @@ class VdaRobot:
         within_m = self._settings.limits.arrived_m
         made = order(self._settings.version, command, self._at, node, within_m, (first, last))
         self._publish("order", made)
+        self._order_id = order_id(command)
 
     def _instant(self, kind: str, action_id: str, parameters: Mapping[str, object]) -> None:
         blocking = "NONE" if self._settings.version == "3.0" else "HARD"
         made = action(kind, action_id, parameters, blocking)
-        self._publish("instantActions", {"actions": [made]})
+        stops = kind in ("cancelOrder", "startPause")
+        self._publish("instantActions", {"actions": [made]}, safe=stops)
 
-    def _publish(self, topic: str, message: Json) -> None:
+    def _publish(self, topic: str, message: Json, safe: bool = False) -> None:
         self._headers[topic] += 1
         header: Json = {
             "headerId": self._headers[topic],
@@ -338,7 +362,7 @@ class VdaRobot:
             "serialNumber": self._serial,
         }
         payload = msgspec.json.encode({**header, **message})
-        self._bus.publish(self._topics[topic], payload, qos=0)
+        self._bus.publish(self._topics[topic], payload, qos=0, safe=safe)
 
 
 def claims(settings: VdaRobotSettings) -> Iterator[tuple[str, tuple[str, ...]]]:

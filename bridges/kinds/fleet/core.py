@@ -13,8 +13,9 @@ FLEET-3. If the robot stands for `obeys_s` and the command is not done, the comm
    pauses between attempts grow. An action is sent again only if its manager refused it, because an
    action must not be done twice. No command is sent again while the robot is paused, takes no orders or
    reports a fault, because a person may be keeping it there.
-FLEET-4. After a stop or pause was sent, the robot must be seen to stand. Until then the command is sent
-   again every `stops_s`, also to a robot that is not read. A new order replaces a stop.
+FLEET-4. A stop or pause is carried out when the robot or its manager has taken it, and a later reading
+   shows that the robot stands. Until then the command is sent again every `stops_s`, also to a robot
+   that is not read. A new order replaces a stop.
 FLEET-5. RMF gets the robot's place only from a fresh reading. After `stale_after_s` without a reading
    the robot is silent.
 FLEET-6. If the robot is on a map that the graph lacks, RMF gets no place. If the robot is on the map
@@ -173,12 +174,13 @@ def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemor
 
 
 def _has_stopped(memory: RobotMemory, command: RobotCommand, now: float) -> bool:
-    """Return whether the robot was seen to stand after the stop or pause was sent. A robot that stood
-    before it may just have taken the command that must be stopped."""
-    if not memory.fresh or memory.reading is None or memory.read_at is None:
+    """Return whether the robot was seen to stand after it had taken the stop or pause. A robot that
+    stands without it may just have taken the command that must be stopped."""
+    if not stands(memory, now):
         return False
+    assert memory.reading is not None
     not_paused = command.doing == "pause" and memory.reading.paused is False
-    return memory.read_at > memory.asked_at and stands(memory, now) and not not_paused
+    return memory.reading.taken == (command.id, command.attempt) and not not_paused
 
 
 def _again(memory: RobotMemory, now: float) -> RobotMemory:

@@ -189,7 +189,9 @@ def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterato
             yield Fault("ROBOT_NOT_THERE", f"it reports arrival, but is {far} its goal")
     if memory.arrived_at is not None and command.goal:
         yield Fault("ROBOT_NOT_CHARGING", f"docked at {command.goal.dock} without a charge")
-    if memory.tries > limits.t.attempts:
+    still = command.doing in ("stop", "pause") and stands(memory, now)
+    if memory.tries > limits.t.attempts and not still:
         yield Fault("ROBOT_NOT_OBEYING", f"{limits.t.attempts} attempts in vain: {command.doing}")
-    elif command.doing in ("stop", "pause") and memory.tries > 1 and not stands(memory, now):
-        yield Fault("ROBOT_NOT_STOPPING", f"it drives on after a {command.doing}")
+    elif command.doing in ("stop", "pause") and memory.tries > 1:
+        what = "it stands, but has not taken the" if still else "it drives on after a"
+        yield Fault("ROBOT_NOT_STOPPING", f"{what} {command.doing}")

@@ -104,7 +104,9 @@ class RobotSample(msgspec.Struct, frozen=True):
     no orders (manual mode, teaching). `said_at`: the robot's own time or counter of this reading.
     `refused`: the manager's refusal of the last command. `unanswered`: the last command was an action,
     and nobody knows whether it has begun. `path`: the places to which the robot's own manager sends it,
-    in turn. `paused`: the robot is paused and waits for a resume.
+    in turn. `paused`: the robot is paused and waits for a resume. `taken`: the last command, as (id,
+    attempt), that the robot or its manager had received and not refused before this reading. It is (0,
+    0) for none. The core needs it for a stop or pause only.
     """
 
     at: Pose
@@ -119,6 +121,7 @@ class RobotSample(msgspec.Struct, frozen=True):
     unanswered: bool = False
     path: tuple[Pose, ...] | None = None
     paused: bool | None = None
+    taken: tuple[int, int] = (0, 0)
 
 
 Doing = Literal["navigate", "dock", "localize", "act", "stop", "pause", "resume"]

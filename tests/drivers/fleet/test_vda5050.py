@@ -230,6 +230,7 @@ class Scripted:
     def __init__(self) -> None:
         self.clock = Time()
         self.said: dict[str, Any] = {}
+        self.sent: list[dict[str, Any]] = []
 
     def listen(self, topic: str) -> None:
         pass
@@ -243,6 +244,20 @@ class Scripted:
     def fresh(self, topic: str, stale_after_s: float) -> Any:
         return self.heard(topic)
 
+    def publish(self, topic: str, payload: bytes, qos: int, safe: bool) -> None:
+        self.sent.append(json.loads(payload))
+
+    @property
+    def ids(self) -> list[str]:
+        """Return the ids of all orders and the types of all instant actions that were sent."""
+        return [one.get("orderId") or one["actions"][0]["actionType"] for one in self.sent]
+
+    def acts(self, status: str, **changes: Any) -> None:
+        """Let the robot report the last instant action with this status."""
+        last = self.sent[-1]["actions"][0]
+        state = {**last, "actionStatus": status}
+        self.says("state", {**STATE, **changes, "actionStates": [state]})
+
     def says(self, what: str, message: dict[str, Any]) -> None:
         from drivers.hal.mqtt import Heard
 
@@ -252,6 +267,7 @@ class Scripted:
 
 STATE: dict[str, Any] = {
     "orderId": "",
+    "lastNodeId": "",
     "nodeStates": [],
     "edgeStates": [],
     "actionStates": [],
@@ -313,6 +329,82 @@ def test_a_failed_action_refuses() -> None:
     driver._sent, driver._acts = (12, 1), True
     sample = driver.read()
     assert (sample.refused, sample.completed) == ("the action startCleaning has failed", "")
+
+
+STOP = RobotCommand(13, "stop", of=12)
+UNDER_WAY = {"orderId": "12", "nodeStates": [{"nodeId": "pantry", "sequenceId": 2}]}
+
+
+def told_to_stop() -> tuple[Scripted, VdaRobot]:
+    """Return a robot that was sent to a goal, and told to stop before it has taken the goal's order."""
+    bus, driver = scripted(driving=False)
+    driver.read()
+    driver.write(RobotOutputs(to(8.0)))
+    driver.read()
+    driver.write(RobotOutputs(STOP))
+    return bus, driver
+
+
+def test_a_stop_goes_out_before_a_state_shows_the_order_and_counts_when_the_robot_has_obeyed() -> (
+    None
+):
+    bus, driver = told_to_stop()
+    assert bus.ids == ["12", "cancelOrder"]
+    assert driver.read().taken == (0, 0), "the old state, read again"
+    bus.says("state", {**STATE, **UNDER_WAY})
+    assert driver.read().taken == (0, 0), "the order arrived after the stop was sent"
+    bus.acts("RUNNING", **UNDER_WAY)
+    assert driver.read().taken == (0, 0)
+    bus.acts("FINISHED", orderId="12", driving=False)
+    assert driver.read().taken == (13, 1)
+
+
+def test_a_stop_that_overtakes_its_order_is_sent_again() -> None:
+    bus, driver = told_to_stop()
+    bus.acts("FAILED", driving=False)
+    assert driver.read().taken == (0, 0), "the order may still be on its way"
+    driver.write(RobotOutputs(msgspec.structs.replace(STOP, attempt=2)))
+    assert bus.ids == ["12", "cancelOrder", "cancelOrder"]
+    assert bus.sent[1]["actions"][0]["actionId"] != bus.sent[2]["actions"][0]["actionId"]
+    bus.acts("FAILED", driving=False)
+    assert driver.read().taken == (13, 2)
+
+
+def test_a_stop_of_a_completed_order_counts_although_the_robot_calls_it_failed() -> None:
+    bus, driver = told_to_stop()
+    bus.acts("FAILED", orderId="12", driving=False)
+    assert driver.read().taken == (13, 1)
+
+
+@pytest.mark.parametrize(
+    ("status", "paused", "taken"),
+    [
+        ("RUNNING", True, False),
+        ("FINISHED", True, True),
+        ("FAILED", False, False),
+        ("FAILED", True, True),
+    ],
+)
+def test_a_pause_counts_when_the_robot_has_obeyed(status: str, paused: bool, taken: bool) -> None:
+    bus, driver = scripted(driving=False, paused=True)
+    driver.read()
+    driver.write(RobotOutputs(RobotCommand(3, "pause")))
+    assert driver.read().taken == (0, 0), "the old state, read again"
+    bus.acts(status, driving=False, paused=paused)
+    assert driver.read().taken == ((3, 1) if taken else (0, 0))
+
+
+def test_nothing_is_sent_to_a_robot_that_is_not_connected() -> None:
+    bus, driver = scripted(driving=False)
+    driver.read()
+    bus.says("connection", {"connectionState": "CONNECTIONBROKEN"})
+    for command in (to(8.0), STOP, RobotCommand(3, "pause")):
+        with pytest.raises(DriverError, match="not connected to the broker: CONNECTIONBROKEN"):
+            driver.write(RobotOutputs(command))
+    assert bus.ids == []
+    bus.says("connection", {"connectionState": "ONLINE"})
+    driver.write(RobotOutputs(STOP))
+    assert bus.ids == ["cancelOrder"]
 
 
 def test_our_orders_are_what_the_standard_asks_for() -> None:

@@ -162,8 +162,29 @@ def test_a_robot_that_has_not_moved_off_yet_is_stopped_too() -> None:  # FLEET-4
     """It stood before the stop, but the command that is stopped may already be on its way."""
     story = driving(7, moving=False).see(0.5).order(Stop(8, of=7))
     assert story.commands[-1] == (0.5, "stop 8, attempt 1")
-    story.see(SCAN_S)
-    assert story.commands[-1] == (0.625, "none")
+    story.now += SCAN_S
+    assert story.see().commands[-1] == (0.625, "none")
+
+
+def test_a_stop_that_was_not_taken_is_sent_again_although_the_robot_stands() -> None:  # FLEET-4
+    """It waits behind a person, and drives off when the person has gone."""
+    story = driving(7, moving=False).order(Stop(8, of=7))
+    story.takes = False
+    story.see(30.0)
+    assert [words for _, words in story.commands[1:4]] == [
+        "stop 8, attempt 1",
+        "stop 8, attempt 2",
+        "stop 8, attempt 3",
+    ]
+    text = "it stands, but has not taken the stop"
+    assert story.report.faults == (Fault("ROBOT_NOT_STOPPING", text),)
+    assert story.report.fit, "RMF's next order replaces the stop"
+    story.see(1.0, moving=True)
+    assert story.faults == ["ROBOT_NOT_OBEYING"]
+    story.see(taken=(8, 3), moving=False)
+    assert story.memory.command is not None, "the robot may have driven since that stop"
+    story.takes = True
+    assert story.see(3.0).commands[-1][1] == "none"
 
 
 def test_a_stop_is_sent_again_to_a_robot_that_is_not_read() -> None:  # FLEET-4

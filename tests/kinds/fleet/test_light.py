@@ -109,7 +109,8 @@ def test_a_path_over_a_lift_goes_on_at_the_other_floor() -> None:
 def test_without_an_answer_it_is_paused() -> None:  # FLEET-LIGHT-2
     story = standing(moving=True)
     assert story.commands == [(0.0, "pause 1, attempt 1")]
-    story.see(SCAN_S, moving=False, paused=True)
+    story.now += SCAN_S
+    story.see(moving=False, paused=True)
     assert story.commands[-1] == (SCAN_S, "none")
 
 
