@@ -130,7 +130,7 @@ class VdaRobot:
         self._headers = dict.fromkeys(topics, 0)
         self._state: Json = {}
         self._at: Pose | None = None
-        self._cancelled = ("", 0)
+        self._cancelled, self._waits = (0, 0), False
         self._decoded: dict[str, tuple[object, Json]] = {}
         self._asked = False
         for topic in ("state", "visualization", "connection", "order"):
@@ -164,16 +164,24 @@ class VdaRobot:
             refused=self._refused(state),
             path=self._path(state),
             paused=flag(state, "paused") if "paused" in state else None,
+            busy=self._waits and has_order(state),
             taken=self._sent if self._taken(state) else (0, 0),
         )
 
     def write(self, outputs: RobotOutputs) -> None:
         """Send the command once for each attempt. If the robot still has another command's order,
-        cancel that order first."""
+        cancel that order first, also once for each attempt. Raises DriverError if the robot is not
+        connected."""
         command = outputs.command and self._settings.theirs(outputs.command)
-        if command is None or self._sent == (command.id, command.attempt):
+        self._waits = command is not None and self._has_other(command)
+        done = self._cancelled if self._waits else self._sent
+        if command is None or done == (command.id, command.attempt):
             return
         self._connected()
+        if self._waits:
+            self._instant("cancelOrder", f"cancel-{command.id}-{command.attempt}", {})
+            self._cancelled = (command.id, command.attempt)
+            return
         if command.doing in INSTANT_COMMANDS:
             self._instant_id = f"{command.doing}-{command.id}-{command.attempt}-{utc()}"
             self._instant(INSTANT_COMMANDS[command.doing], self._instant_id, {})
@@ -181,10 +189,12 @@ class VdaRobot:
             self._localize(command)
         elif not has_order(self._state):
             self._order(command)
-        elif self._ours() != str(command.id):
-            self._cancel(command.attempt)
-            return
         self._sent, self._acts = (command.id, command.attempt), command.doing == "act"
+
+    def _has_other(self, command: RobotCommand) -> bool:
+        """Does the robot have another order than the order that this command needs?"""
+        instant = command.doing in INSTANT_COMMANDS or command.doing == "localize"
+        return not instant and has_order(self._state) and self._ours() != str(command.id)
 
     def _ours(self, state: Json | None = None) -> str:
         """Return the number of the command whose order the robot has. This is the first part of the
@@ -308,14 +318,6 @@ class VdaRobot:
             return how == "FINISHED" or (how == "FAILED" and state.get("paused") is True)
         knows_order = self._sent[1] > 1 or text(state, "orderId") == self._order_id
         return not has_order(state) and (how == "FINISHED" or (how == "FAILED" and knows_order))
-
-    def _cancel(self, attempt: int) -> None:
-        """Cancel the robot's order, once for each attempt."""
-        cancelled = (text(self._state, "orderId"), attempt)
-        if not has_order(self._state) or cancelled == self._cancelled:
-            return
-        self._instant("cancelOrder", f"cancel-{cancelled[0]}-{attempt}", {})
-        self._cancelled = cancelled
 
     def _localize(self, command: RobotCommand) -> None:
         assert command.goal is not None

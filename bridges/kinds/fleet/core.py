@@ -15,7 +15,8 @@ FLEET-3. If the robot stands for `obeys_s` and the command is not done, the comm
    reports a fault, because a person may be keeping it there.
 FLEET-4. A stop or pause is carried out when the robot or its manager has taken it, and a later reading
    shows that the robot stands. Until then the command is sent again every `stops_s`, also to a robot
-   that is not read. A new order replaces a stop.
+   that is not read. A new order replaces a stop. While a robot keeps the order of an earlier command,
+   the new command, and with it the cancelling, is also sent again every `stops_s`.
 FLEET-5. RMF gets the robot's place only from a fresh reading. After `stale_after_s` without a reading
    the robot is silent.
 FLEET-6. If the robot is on a map that the graph lacks, RMF gets no place. If the robot is on the map
@@ -229,6 +230,8 @@ def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: Ro
     the robot itself keeps it standing."""
     assert memory.reading is not None
     reading = memory.reading
+    if reading.busy:
+        return memory.asked_at + limits.t.stops_s
     kept = reading.paused is True or bool(reading.taken_out or reading.fault)
     if kept and command.doing != "resume":
         return NEVER

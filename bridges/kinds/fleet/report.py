@@ -195,3 +195,5 @@ def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterato
     elif command.doing in ("stop", "pause") and memory.tries > 1:
         what = "it stands, but has not taken the" if still else "it drives on after a"
         yield Fault("ROBOT_NOT_STOPPING", f"{what} {command.doing}")
+    elif reading.busy and memory.tries > 1:
+        yield Fault("ROBOT_NOT_STOPPING", "it keeps an earlier order, although that was cancelled")

@@ -106,7 +106,9 @@ class RobotSample(msgspec.Struct, frozen=True):
     and nobody knows whether it has begun. `path`: the places to which the robot's own manager sends it,
     in turn. `paused`: the robot is paused and waits for a resume. `taken`: the last command, as (id,
     attempt), that the robot or its manager had received and not refused before this reading. It is (0,
-    0) for none. The core needs it for a stop or pause only.
+    0) for none. The core needs it for a stop or pause only. `busy`: the driver has not sent the last
+    command yet, because the robot still has the order of an earlier one. The driver cancels that order,
+    once for each attempt.
     """
 
     at: Pose
@@ -122,6 +124,7 @@ class RobotSample(msgspec.Struct, frozen=True):
     path: tuple[Pose, ...] | None = None
     paused: bool | None = None
     taken: tuple[int, int] = (0, 0)
+    busy: bool = False
 
 
 Doing = Literal["navigate", "dock", "localize", "act", "stop", "pause", "resume"]

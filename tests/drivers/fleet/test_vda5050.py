@@ -394,6 +394,41 @@ def test_a_pause_counts_when_the_robot_has_obeyed(status: str, paused: bool, tak
     assert driver.read().taken == ((3, 1) if taken else (0, 0))
 
 
+def test_an_earlier_order_is_cancelled_at_each_attempt_until_the_robot_has_given_it_up() -> None:
+    bus, driver = scripted(**UNDER_WAY)
+    driver.read()
+    for attempt in (1, 1, 2):
+        driver.write(RobotOutputs(to(3.0, 14, attempt=attempt)))
+        assert driver.read().busy
+    assert bus.ids == ["cancelOrder", "cancelOrder"]
+    assert bus.sent[0]["actions"][0]["actionId"] != bus.sent[1]["actions"][0]["actionId"]
+    bus.acts("FINISHED", orderId="12", driving=False)
+    assert not driver.read().busy
+    driver.write(RobotOutputs(to(3.0, 14, attempt=2)))
+    assert bus.ids[2:] == ["14-2"]
+    assert not driver.read().busy
+
+
+def test_an_order_that_the_robot_took_late_is_cancelled_too() -> None:
+    """RMF gave two goals one after the other. The robot refuses the second order."""
+    bus, driver = scripted(driving=False)
+    for command in (to(8.0), to(3.0, 14)):
+        driver.read()
+        driver.write(RobotOutputs(command))
+    bus.says("state", {**STATE, **UNDER_WAY})
+    driver.read()
+    driver.write(RobotOutputs(to(3.0, 14)))
+    assert bus.ids == ["12", "14", "cancelOrder"]
+    assert driver.read().busy
+
+
+def test_an_order_of_the_robots_own_manager_keeps_no_pause_waiting() -> None:
+    bus, driver = scripted(**{**UNDER_WAY, "orderId": "mission-3"})
+    driver.read()
+    driver.write(RobotOutputs(RobotCommand(3, "pause")))
+    assert (bus.ids, driver.read().busy) == (["startPause"], False)
+
+
 def test_nothing_is_sent_to_a_robot_that_is_not_connected() -> None:
     bus, driver = scripted(driving=False)
     driver.read()

@@ -234,6 +234,27 @@ def test_a_stop_of_an_earlier_command_stops_nothing() -> None:
     assert story.commands[-1] == (0.0, "navigate 8, attempt 1")
 
 
+def test_a_robot_that_keeps_an_earlier_order_gets_the_new_command_again() -> None:  # FLEET-4
+    """The driver cancels the earlier order at each attempt. A message of VDA 5050 can get lost."""
+    story = driving(7, moving=True).order(Navigate(8, goal(8.0))).see(2.875, busy=True)
+    assert (len(story.commands), story.faults) == (2, [])
+    story.see(0.125)
+    assert story.commands[-1] == (3.0, "navigate 8, attempt 2")
+    text = "it keeps an earlier order, although that was cancelled"
+    assert story.report.faults == (Fault("ROBOT_NOT_STOPPING", text),)
+    story.see(3.0, moving=False, fault="emergency stop")
+    assert story.commands[-1] == (6.0, "navigate 8, attempt 3")
+    story.see(100.0, busy=False, moving=True, fault="")
+    assert (story.commands[-1], story.faults) == ((6.0, "navigate 8, attempt 3"), [])
+
+
+def test_an_action_that_waits_for_an_earlier_order_is_no_action_that_was_sent() -> None:
+    story = driving(7, completed="", moving=True).order(Act(8, "clean")).see(3.0, busy=True)
+    assert story.commands[-1] == (3.0, "act 8, attempt 2")
+    story.see(60.0, busy=False)
+    assert story.commands[-1] == (3.0, "act 8, attempt 2")
+
+
 def test_a_new_goal_replaces_a_stop() -> None:  # FLEET-4
     story = driving(7, moving=True).order(Stop(8, of=7)).order(Navigate(9, PANTRY))
     story.see(20.0)
