@@ -28,7 +28,7 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers import DriverError
 from drivers.driver_type import DriverType
-from drivers.fleet.vda_messages import DIALECTS, Json, Version, action, order, order_id
+from drivers.fleet.vda_messages import DIALECTS, Json, Version, action, action_id, order, order_id
 from drivers.fleet.vda_state import (
     ended,
     errors,
@@ -153,6 +153,7 @@ class VdaRobot:
         at = self._place(state, heard.at or 0.0, driving)
         power = part(state, self._says.power)
         self._state, self._at = state, at
+        refused, failed = self._in_vain(state)
         return RobotSample(
             at=self._settings.level_of(at),
             battery=number(power, self._says.charge) / 100.0,
@@ -161,7 +162,8 @@ class VdaRobot:
             completed=self._completed(state),
             fault=self._fault(state),
             taken_out=taken_out(state),
-            refused=self._refused(state),
+            refused=refused,
+            failed=failed,
             path=self._path(state),
             paused=flag(state, "paused") if "paused" in state else None,
             busy=self._waits and has_order(state),
@@ -297,15 +299,24 @@ class VdaRobot:
                 found.append(told(error))
         return "; ".join(found)
 
-    def _refused(self, state: Json) -> str:
-        """Return the robot's errors and failed actions that refer to the driver's last order."""
-        ours = str(self._sent[0])
-        about = (e for e in errors(state) if ours in {r.partition("-")[0] for r in references(e)})
-        found = [told(error) for error in about]
-        if self._ours(state) == ours:
-            failed = (a for a in order_actions(state) if a.get("actionStatus") == "FAILED")
-            found += [f"the action {clean(str(a.get('actionType')))} has failed" for a in failed]
-        return "; ".join(found)
+    def _in_vain(self, state: Json) -> tuple[str, str]:
+        """Return why the robot has refused the driver's last order, and why an action that it took has
+        failed. Each is "" if this is not so.
+
+        A state may come too late to show that an action was running. So an action of an order that the
+        robot has taken is never called refused.
+        """
+        if self._waits or self._order_id.partition("-")[0] != str(self._sent[0]):
+            return "", ""
+        ours = {self._order_id, *(f"{what}-{self._order_id}" for what in ("act", "dock", "leave"))}
+        found = [told(error) for error in errors(state) if ours & set(references(error))]
+        if text(state, "orderId") != self._order_id:
+            return "; ".join(found), ""
+        failed = [a for a in order_actions(state) if a.get("actionStatus") == "FAILED"]
+        found += [f"the action {clean(str(a.get('actionType')))} has failed" for a in failed]
+        if not self._acts:
+            return "; ".join(found), ""
+        return "", "; ".join(found) if failed else ""
 
     def _taken(self, state: Json) -> bool:
         """Does the state show that the robot has received the last stop or pause?
@@ -330,18 +341,18 @@ class VdaRobot:
         assert self._at is not None
         last: list[Json] = []
         if command.doing == "dock" and self._settings.dock_action:
-            last.append(action(self._settings.dock_action, f"dock-{command.id}", {}, "HARD"))
+            last.append(action(self._settings.dock_action, action_id("dock", command), {}, "HARD"))
         if command.doing == "act":
             known = self._settings.actions.get(command.activity)
             if known is None:
                 raise DriverError(f"the YAML has no action '{command.activity}' for this robot")
             given = msgspec.json.decode(command.description)
             parameters = given if isinstance(given, dict) else {"description": given}
-            last.append(action(known.type, f"act-{command.id}", parameters, "HARD"))
+            last.append(action(known.type, action_id("act", command), parameters, "HARD"))
         charging = part(self._state, self._says.power).get("charging")
         first = []
         if charging and command.goal is not None:
-            first.append(action("stopCharging", f"leave-{command.id}", {}, "HARD"))
+            first.append(action("stopCharging", action_id("leave", command), {}, "HARD"))
         node = text(self._state, "lastNodeId")
         within_m = self._settings.limits.arrived_m
         made = order(self._settings.version, command, self._at, node, within_m, (first, last))

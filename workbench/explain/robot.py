@@ -23,6 +23,7 @@ STANDS: Final[Mapping[str, str]] = {
     "ROBOT_ON_OTHER_MAP": "is on a map that RMF's graph lacks",
     "ROBOT_NOT_OBEYING": "does not obey",
     "ROBOT_PAUSED_BY_OTHERS": "was paused by somebody else",
+    "ROBOT_ACTION_FAILED": "began its action, and failed",
     "ROBOT_ACTION_UNANSWERED": "may have begun its action, or not",
     "ROBOT_REFUSES": "refuses its command",
     "ROBOT_OFF_GRAPH": "is off the graph",

@@ -33,7 +33,8 @@ FLEET-10. A robot gets no new task while it reports a fault, takes no orders, is
    gets tasks again.
 FLEET-11. If RMF has given up an activity, the activity is stopped.
 FLEET-12. After an operator's reset, the attempts are counted from the beginning, and the command is
-   sent again. An action is sent again only if it was refused, or if nobody knows whether it has begun.
+   sent again. An action is sent again only if it was refused, if it has failed, or if nobody knows
+   whether it has begun.
 
 `light.py` has the rules for a robot that RMF can only pause.
 """
@@ -119,7 +120,7 @@ def _reset(memory: RobotMemory, now: float) -> RobotMemory:
     if memory.command is None:
         return memory
     reading = memory.reading
-    lost = reading is not None and (reading.refused or reading.unanswered)
+    lost = reading and (reading.refused or reading.unanswered or reading.failed)
     if memory.command.doing == "act" and not lost:
         return replace(memory, tries=1)
     return replace(_again(memory, now), tries=1)

@@ -182,6 +182,8 @@ def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterato
     if reading.unanswered and command.doing == "act":
         text = f"nobody knows whether {command.activity} has begun: a reset sends it again"
         yield Fault("ROBOT_ACTION_UNANSWERED", text)
+    if reading.failed and command.doing == "act":
+        yield Fault("ROBOT_ACTION_FAILED", f"{reading.failed}: a reset sends it again")
     if command.goal and reading.completed == str(command.id):
         off_m = off_goal_m(memory, command.goal, limits)
         if off_m > limits.t.arrived_m:

@@ -280,9 +280,10 @@ STATE: dict[str, Any] = {
 }
 
 
-def scripted(**changes: Any) -> tuple[Scripted, VdaRobot]:
+def scripted(actions: Any = None, **changes: Any) -> tuple[Scripted, VdaRobot]:
     bus = Scripted()
-    driver = VdaRobot("AMR01", VdaRobotSettings(manufacturer="acme"), bus)  # type: ignore[arg-type]
+    settings = VdaRobotSettings(manufacturer="acme", actions=actions or {})
+    driver = VdaRobot("AMR01", settings, bus)  # type: ignore[arg-type]
     bus.says("state", {**STATE, **changes})
     return bus, driver
 
@@ -323,12 +324,61 @@ def test_a_state_without_a_needed_field_names_it(field: str) -> None:
         driver.read()
 
 
-def test_a_failed_action_refuses() -> None:
-    failed = {"actionId": "act-12", "actionType": "startCleaning", "actionStatus": "FAILED"}
-    _, driver = scripted(orderId="12", actionStates=[failed], driving=False)
-    driver._sent, driver._acts = (12, 1), True
+def sent_to_clean() -> tuple[Scripted, VdaRobot]:
+    """Return a robot that was sent the action `clean`."""
+    actions = {"clean": VdaActionSettings(type="startCleaning")}
+    bus, driver = scripted(driving=False, actions=actions)
+    driver.read()
+    driver.write(RobotOutputs(RobotCommand(12, "act", activity="clean")))
+    return bus, driver
+
+
+def clean(status: str, attempt: str = "", **changes: Any) -> dict[str, Any]:
+    """Return a state with the action of this attempt."""
+    one = {"actionId": f"act-12{attempt}", "actionType": "startCleaning", "actionStatus": status}
+    order = f"12{attempt}"
+    return {**STATE, "driving": False, "orderId": order, "actionStates": [one], **changes}
+
+
+def in_vain(driver: VdaRobot) -> tuple[str, str, str | None]:
     sample = driver.read()
-    assert (sample.refused, sample.completed) == ("the action startCleaning has failed", "")
+    return sample.refused, sample.failed, sample.completed
+
+
+def test_an_action_that_the_robot_took_fails_and_is_not_refused() -> None:
+    bus, driver = sent_to_clean()
+    error = {"errorType": "brush", "errorLevel": "WARNING"}
+    error["errorReferences"] = [{"referenceKey": "orderId", "referenceValue": "12"}]  # type: ignore[assignment]
+    bus.says("state", clean("RUNNING", errors=[error]))
+    assert in_vain(driver) == ("", "", "")
+    bus.says("state", clean("FAILED", errors=[error]))
+    assert in_vain(driver) == ("", "brush; the action startCleaning has failed", "")
+    driver.write(RobotOutputs(RobotCommand(12, "act", 2, activity="clean")))
+    assert in_vain(driver) == ("", "", ""), "the failure was that of the first attempt"
+    ids = [one["nodes"][0]["actions"][0]["actionId"] for one in bus.sent]
+    assert ids == ["act-12", "act-12-2"]
+    bus.says("state", clean("FINISHED", "-2"))
+    assert in_vain(driver) == ("", "", "12")
+
+
+@pytest.mark.parametrize("about", ["12", "act-12"])
+def test_an_error_about_an_order_that_the_robot_has_not_taken_is_a_refusal(about: str) -> None:
+    bus, driver = sent_to_clean()
+    reference = {"referenceKey": "id", "referenceValue": about}
+    error = {"errorType": "orderError", "errorLevel": "WARNING", "errorReferences": [reference]}
+    bus.says("state", {**STATE, "driving": False, "errors": [error]})
+    assert in_vain(driver) == ("orderError", "", "")
+    driver.write(RobotOutputs(RobotCommand(12, "act", 2, activity="clean")))
+    assert in_vain(driver) == ("", "", ""), "the error is about the first attempt"
+
+
+def test_an_action_that_a_stop_has_ended_is_neither_refused_nor_failed() -> None:
+    bus, driver = sent_to_clean()
+    bus.says("state", clean("RUNNING"))
+    driver.read()
+    driver.write(RobotOutputs(STOP))
+    bus.says("state", clean("FAILED"))
+    assert in_vain(driver) == ("", "", "")
 
 
 STOP = RobotCommand(13, "stop", of=12)

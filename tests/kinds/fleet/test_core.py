@@ -125,6 +125,16 @@ def test_an_action_without_an_answer_waits_for_a_person() -> None:
     assert story.commands[-1] == (60.0, "act 9, attempt 2")
 
 
+def test_an_action_that_failed_waits_for_a_person() -> None:  # FLEET-3, FLEET-12
+    story = Story().see(completed="", moving=False).order(Act(9, "clean"))
+    story.see(300.0, failed="the action clean has failed")
+    assert story.commands == [(0.0, "act 9, attempt 1")]
+    text = "the action clean has failed: a reset sends it again"
+    assert story.report.faults == (Fault("ROBOT_ACTION_FAILED", text),)
+    story.take(OperatorReset())
+    assert story.commands[-1] == (300.0, "act 9, attempt 2")
+
+
 def test_a_new_order_replaces_the_old_one() -> None:  # FLEET-1
     story = driving(7, completed="", moving=True).see(1.0, at=at(1.0))
     story.order(Navigate(8, goal(8.0)))
