@@ -114,7 +114,7 @@ class HttpRobot:
         self._settings = settings
         self._api = settings.interface()
         self._bus = bus
-        self._sent = (0, 0)
+        self._sent, self._running = (0, 0), 0
         self._refused = ""
         self._unanswered = False
 
@@ -218,6 +218,8 @@ class HttpRobot:
 
     def _done(self, command: RobotCommand, refused: str = "", unanswered: bool = False) -> None:
         self._sent = (command.id, command.attempt)
+        if command.doing not in ("pause", "resume"):
+            self._running = command.of or command.id
         self._refused, self._unanswered = refused, unanswered
 
     def _call(self, command: RobotCommand) -> Call | None:
@@ -251,10 +253,13 @@ class HttpRobot:
 
     def make_safe(self) -> None:
         """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the
-        robot drives to its last goal."""
+        robot drives to its last goal. Raises DriverError if the manager refuses."""
         dies = self._settings.on_death
-        if dies != "finish" and (call := self._call(RobotCommand(0, dies))):
-            self._send(call, RobotCommand(0, dies))
+        if dies == "finish":
+            return
+        command = RobotCommand(0, dies, of=self._running)
+        if (call := self._call(command)) and (refused := self._send(call, command)):
+            raise DriverError(refused)
 
     def close(self) -> None:
         """Do nothing, because the driver holds no resource."""

@@ -205,9 +205,10 @@ class VdaRobot:
 
     def make_safe(self) -> None:
         """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the
-        robot finishes its order."""
+        robot finishes its order. Raises DriverError if the robot is not connected."""
         if kind := INSTANT_COMMANDS.get(self._settings.on_death):
             self._instant(kind, f"on-death-{utc()}", {})
+            self._connected()
 
     def close(self) -> None:
         """Do nothing, because the bus ends the connection."""

@@ -316,6 +316,28 @@ def test_a_death_leaves_the_robot_driving_unless_the_yaml_says_stop() -> None:
         assert [e.signal for e in bench.plants["AMR01"].edges if e.what == "relay"] == ["stop"]
 
 
+def test_a_stop_at_death_that_the_manager_refuses_is_an_error() -> None:
+    with fleet(msgspec.structs.replace(DEMOS, on_death="stop")) as bench:
+        bench.plants["AMR01"].press("manual", True, bench.plants["AMR01"].now)
+        with pytest.raises(DriverError, match="stop is refused: the robot is in manual mode"):
+            bench.drivers["AMR01"].make_safe()
+
+
+@pytest.mark.parametrize("last", [to(4.0), RobotCommand(13, "stop", of=12)])
+def test_a_stop_at_death_names_the_command_that_it_stops(last: RobotCommand) -> None:
+    sent: list[str] = []
+
+    class Heard:
+        def ask(self, path: str, method: str, body: str | None, safe: bool) -> dict[str, object]:
+            sent.append(path)
+            return {"success": True}
+
+    driver = HttpRobot("AMR01", msgspec.structs.replace(DEMOS, on_death="stop"), Heard())  # type: ignore[arg-type]
+    driver.write(RobotOutputs(last))
+    driver.make_safe()
+    assert "running_cmd_id=12" in sent[-1]
+
+
 YAML = """\
 kind: fleet
 driver: http

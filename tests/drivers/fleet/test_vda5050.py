@@ -492,6 +492,18 @@ def test_nothing_is_sent_to_a_robot_that_is_not_connected() -> None:
     assert bus.ids == ["cancelOrder"]
 
 
+def test_a_stop_at_death_of_a_robot_that_is_not_connected_is_an_error() -> None:
+    bus = Scripted()
+    settings = VdaRobotSettings(manufacturer="acme", on_death="stop")
+    driver = VdaRobot("AMR01", settings, bus)  # type: ignore[arg-type]
+    bus.says("connection", {"connectionState": "OFFLINE"})
+    with pytest.raises(DriverError, match="not connected to the broker: OFFLINE"):
+        driver.make_safe()
+    bus.says("connection", {"connectionState": "ONLINE"})
+    driver.make_safe()
+    assert bus.ids == ["cancelOrder", "cancelOrder"]
+
+
 def test_our_orders_are_what_the_standard_asks_for() -> None:
     with robot() as bench:
         bench.until(moving=False)
