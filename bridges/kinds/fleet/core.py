@@ -178,7 +178,7 @@ def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemor
 def _has_stopped(memory: RobotMemory, command: RobotCommand, now: float) -> bool:
     """Return whether the robot was seen to stand after it had taken the stop or pause. A robot that
     stands without it may just have taken the command that must be stopped."""
-    if not stands(memory, now):
+    if not stands(memory):
         return False
     assert memory.reading is not None
     not_paused = command.doing == "pause" and memory.reading.paused is False
@@ -223,7 +223,7 @@ def _is_there(memory: RobotMemory, command: RobotCommand, now: float, limits: Ro
         return False
     if memory.reading.completed is not None:
         return memory.reading.completed == str(command.id)
-    return stands(memory, now) and faces(memory, command.goal, limits)
+    return stands(memory) and faces(memory, command.goal, limits)
 
 
 def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> float:
@@ -238,7 +238,7 @@ def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: Ro
         return NEVER
     if memory.arrived_at is not None:
         return memory.arrived_at + limits.t.docks_s
-    waits = reading.refused if command.doing == "act" else stands(memory, now)
+    waits = reading.refused if command.doing == "act" else stands(memory)
     pause_s = limits.t.obeys_s * min(memory.tries, MOST_PAUSES)
     since = memory.asked_at if command.doing == "act" else max(memory.asked_at, memory.moved_at)
     return since + pause_s if waits else NEVER

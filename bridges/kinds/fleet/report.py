@@ -144,7 +144,7 @@ def _of_light(memory: RobotMemory, now: float) -> Iterator[Fault]:
         yield Fault("ROBOT_PAUSED_BY_OTHERS", text)
     if light.answer is not None and light.answer.says == "error":
         yield Fault("ROBOT_PASSED_LIGHT", "it is where RMF has not let it go")
-    if not light.path and not reading.path and not stands(memory, now) and memory.fresh:
+    if not light.path and not reading.path and not stands(memory) and memory.fresh:
         yield Fault("ROBOT_WITHOUT_PATH", "it drives, and its manager tells no path")
 
 
@@ -191,7 +191,7 @@ def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterato
             yield Fault("ROBOT_NOT_THERE", f"it reports arrival, but is {far} its goal")
     if memory.arrived_at is not None and command.goal:
         yield Fault("ROBOT_NOT_CHARGING", f"docked at {command.goal.dock} without a charge")
-    still = command.doing in ("stop", "pause") and stands(memory, now)
+    still = command.doing in ("stop", "pause") and stands(memory)
     if memory.tries > limits.t.attempts and not still:
         yield Fault("ROBOT_NOT_OBEYING", f"{limits.t.attempts} attempts in vain: {command.doing}")
     elif command.doing in ("stop", "pause") and memory.tries > 1:
