@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from bridges.kinds.fleet.report import RobotReport
 from bridges.kinds.fleet.signals import Act, LightAnswer, Localize, Navigate, Order, Pose, Stop
 from bridges.kinds.shared.decision import Fault
 from bridges.runtime.fleet import robot as rmf_robot
-from bridges.runtime.fleet.adapter import FleetAdapter, installed
+from bridges.runtime.fleet.adapter import NOT_PASSED, FleetAdapter, installed
 from bridges.settings.fleet_site import FleetSite, read_site
 from bridges.settings.load import load
 from bridges.transports.transport import TransportError
@@ -128,6 +129,23 @@ class TestOnTheStandIn(AdapterContract):
         rmf.schedule = True
         assert adapter.connect()
         adapter.close()
+
+    def test_a_robot_that_config_yaml_lacks_is_told_with_the_reason(
+        self, stand_in: StandIn, rmf: Joined
+    ) -> None:
+        rmf.says(robot="AMR99")
+        reason = rmf.adapter.failed["AMR99"]
+        assert reason == f"{NOT_PASSED}: add_robot(): incompatible function arguments."
+
+    def test_files_at_which_rmf_throws_are_told_by_name(self, tmp_path: Path) -> None:
+        config = tmp_path / "config.yaml"
+        text = Path(SITE.config_file).read_text()
+        config.write_text(text.replace("{charger: wait_1}", "{charger: {waypoint: wait_1}}"))
+        site = msgspec.structs.replace(SITE, config_file=str(config))
+        rmf = StandIn(patrols=False)
+        adapter = FleetAdapter(rmf, site, None, lambda robot, order: None, itertools.count())
+        with pytest.raises(TransportError, match=r"refuses .*config.yaml or .*: bad conversion"):
+            adapter.connect()
 
     def test_goals_come_on_a_foreign_thread_in_the_robots_coordinates(
         self, stand_in: StandIn, rmf: Joined
