@@ -101,7 +101,7 @@ class RobotHandle:
 
     def __init__(self, robot: PatrolRobot, lock: threading.RLock) -> None:
         self.robot = robot
-        self.issues: dict[str, Any] = {}
+        self.issues: list[tuple[str, dict[str, str]]] = []
         self._lock = lock
 
     def update(self, state: RobotState, activity: Any) -> None:
@@ -127,8 +127,9 @@ class RobotHandle:
 
     def create_issue(self, tier: object, category: str, detail: dict[str, str]) -> Any:
         """Note an issue until its ticket is resolved."""
-        self.issues[category] = detail
-        return SimpleNamespace(resolve=lambda message: self.issues.pop(category, None))
+        issue = (category, detail)
+        self.issues.append(issue)
+        return SimpleNamespace(resolve=lambda message: self.issues.remove(issue))
 
 
 class EasyFleet:

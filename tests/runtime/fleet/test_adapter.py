@@ -234,9 +234,33 @@ class TestOnTheStandIn(AdapterContract):
         rmf.says()
         rmf.says(faults=(Fault("ROBOT_FAULT", "wheel motor too hot"),), fit=False)
         issues = self.handle(stand_in).issues
-        assert issues == {"ROBOT_FAULT": {"detail": "wheel motor too hot"}}
+        assert issues == [("ROBOT_FAULT", {"detail": "wheel motor too hot"})]
         rmf.says()
-        assert issues == {}
+        assert issues == []
+
+    def test_an_issue_has_the_text_of_its_fault_and_two_faults_are_two_issues(
+        self, stand_in: StandIn, rmf: Joined
+    ) -> None:
+        def told(*details: str) -> list[str]:
+            rmf.says(faults=tuple(Fault("CHARGER_REPORTS_ERROR", text) for text in details))
+            return sorted(issue["detail"] for _, issue in self.handle(stand_in).issues)
+
+        rmf.says()
+        assert told("charger_a: hot") == ["charger_a: hot"]
+        assert told("charger_a: no power") == ["charger_a: no power"]
+        both = ["charger_a: no power", "charger_b: hot"]
+        assert told(*both) == both
+        assert told("charger_b: hot") == ["charger_b: hot"]
+
+    def test_an_issue_lasts_while_its_fault_only_counts(
+        self, stand_in: StandIn, rmf: Joined
+    ) -> None:
+        rmf.says()
+        for age_s in (4, 5, 6):
+            text = f"its reported position is {age_s} s old"
+            rmf.says(faults=(Fault("ROBOT_NOT_READ", text),))
+        first = {"detail": "its reported position is 4 s old"}
+        assert self.handle(stand_in).issues == [("ROBOT_NOT_READ", first)]
 
     def test_the_fleets_state_goes_out_while_rmf_is_a_stand_in(
         self, stand_in: StandIn, rmf: Joined
