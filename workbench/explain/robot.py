@@ -79,8 +79,10 @@ def explanation(
         )
         before = (
             f"Its daemon's report: at {said.value('at')}, doing {said.value('doing') or 'nothing'},"
-            f" battery {said.value('battery') or 'unknown'}, new tasks {said.value('new_tasks')}."
+            f" battery {said.value('battery') or 'unknown'}"
         )
+        tasks = said.value("new_tasks")  # missing with `control: traffic_light`
+        before += f", new tasks {tasks}." if tasks else "."
     return Explanation(
         kind="robot",
         device=label(who),

@@ -23,7 +23,8 @@ class RobotReport(msgspec.Struct, frozen=True):
     """The values for RMF's adapter. `at`: the robot's place on its own map, from a fresh reading; None
     if RMF must get no place. `battery`: a fraction of 1. `activity`: the number of the present
     command; 0 without a command. `finished`: the number of the last command that was carried out.
-    `fit`: whether the robot may get new tasks. `light`: for a robot that RMF can only pause.
+    `fit`: whether the robot may get new tasks. RMF gives no tasks to a robot that it can only pause.
+    For such a robot `fit` is None, and `light` has its progress.
 
     `where`: the nearest waypoint, for people. `doing`: the command, for people.
     """
@@ -32,7 +33,7 @@ class RobotReport(msgspec.Struct, frozen=True):
     battery: float = 0.0
     activity: int = 0
     finished: int = 0
-    fit: bool = False
+    fit: bool | None = False
     where: str = ""
     doing: str = ""
     read_at: float | None = None
@@ -49,12 +50,13 @@ def report(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotReport:
     """Report the present state of the robot."""
     found = tuple(faults(memory, now, limits))
     command, reading = memory.command, memory.reading
+    fit = reading is not None and not any(fault.code in UNFIT for fault in found)
     return RobotReport(
         at=_place(memory, limits),
         battery=reading.battery if reading else 0.0,
         activity=command.id if command and command.doing != "stop" else 0,
         finished=memory.finished,
-        fit=reading is not None and not any(fault.code in UNFIT for fault in found),
+        fit=None if limits.light else fit,
         where=_where(memory, limits),
         doing=_light(memory, limits) if limits.light else _doing(memory),
         read_at=memory.read_at,

@@ -69,7 +69,7 @@ class RmfRobot:
             self._give_up(number)
         more = self.handle.more()
         if more is not None:
-            self._commission(more, report.fit)
+            self._commission(more, bool(report.fit))
             self._issue(more, report.faults)
 
     def _state(self, report: RobotReport) -> Any:

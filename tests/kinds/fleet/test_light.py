@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.fleet.keep import KEEPING
 from bridges.kinds.fleet.light import LightQuestion
+from bridges.kinds.fleet.messages import summary
 from bridges.kinds.fleet.signals import LightAnswer, Pose, RobotSample, Says
 from bridges.kinds.shared.decision import Fault, OperatorReset
 from tests.kinds.fleet.story import LIMITS, SCAN_S, SITE, Story, at
@@ -101,6 +102,14 @@ def test_a_path_over_a_lift_goes_on_at_the_other_floor() -> None:
     says(story, "continue", 0).see(at=at(8.0))
     says(story, "continue", 1).see(at=at(8.0, level="L2"))
     assert asked(story) == (1, 2, "moving")
+
+
+def test_nothing_is_told_of_new_tasks_because_rmf_gives_such_a_robot_none() -> None:
+    assert summary(started().report) == {
+        "at": "L1 charger_a",
+        "doing": "path to L1 lift1_L1, at checkpoint 0 of 3, RMF's light: resume",
+        "battery": "80 %",
+    }
 
 
 # ---- when the robot is paused (FLEET-LIGHT-2)
