@@ -203,6 +203,10 @@ class VdaRobot:
         order's id."""
         return text(self._state if state is None else state, "orderId").partition("-")[0]
 
+    def _is_last(self, order: str) -> bool:
+        """Is this the id of the last command's order?"""
+        return order.partition("-")[0] == str(self._sent[0])
+
     def make_safe(self) -> None:
         """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the
         robot finishes its order. Raises DriverError if the robot is not connected."""
@@ -307,7 +311,7 @@ class VdaRobot:
         A state may come too late to show that an action was running. So an action of an order that the
         robot has taken is never called refused.
         """
-        if self._waits or self._order_id.partition("-")[0] != str(self._sent[0]):
+        if self._waits or not self._is_last(self._order_id):
             return "", ""
         ours = {self._order_id, *(f"{what}-{self._order_id}" for what in ("act", "dock", "leave"))}
         found = [told(error) for error in errors(state) if ours & set(references(error))]
@@ -320,11 +324,13 @@ class VdaRobot:
         return "", "; ".join(found) if failed else ""
 
     def _taken(self, state: Json) -> bool:
-        """Does the state show that the robot has received the last stop or pause?
+        """Does the state show that the robot has taken the last order, stop or pause?
 
         A robot that reports a stop as failed has no order. If the state does not show the last order
         yet, the order may still be on its way, so only a second such report counts.
         """
+        if self._is_last(self._order_id):
+            return text(state, "orderId") == self._order_id
         how = ended(state, self._instant_id)
         if self._instant_id.startswith("pause-"):
             return how == "FINISHED" or (how == "FAILED" and state.get("paused") is True)

@@ -9,10 +9,11 @@ FLEET-2. A command is done when the robot is within `arrived_m` of the goal, on 
    robot reports completed commands, it must also have reported this command. Otherwise the robot must
    stand and face in the goal's direction. If a robot reports a command as completed at another place,
    the command is not done, and the report is a fault.
-FLEET-3. If the robot stands for `obeys_s` and the command is not done, the command is sent again. The
-   pauses between attempts grow. An action is sent again only if its manager refused it, because an
-   action must not be done twice. No command is sent again while the robot is paused, takes no orders or
-   reports a fault, because a person may be keeping it there.
+FLEET-3. If the robot stands for `obeys_s` and the command is not done, the command is sent again. So is
+   a command that was refused, even while the robot still drives to an earlier goal. The pauses between
+   attempts grow. An action is sent again only if its manager refused it, because an action must not be
+   done twice. No command is sent again while the robot is paused, takes no orders or reports a fault,
+   because a person may be keeping it there.
 FLEET-4. A stop or pause is carried out when the robot or its manager has taken it, and a later reading
    shows that the robot stands. Until then the command is sent again every `stops_s`, also to a robot
    that is not read. A new order replaces a stop. While a robot keeps the order of an earlier command,
@@ -227,8 +228,8 @@ def _is_there(memory: RobotMemory, command: RobotCommand, now: float, limits: Ro
 
 
 def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> float:
-    """Return the time of the next attempt. Return NEVER while the robot moves, and while a person or
-    the robot itself keeps it standing."""
+    """Return the time of the next attempt. Return NEVER while the robot moves by the command, and while
+    a person or the robot itself keeps it standing."""
     assert memory.reading is not None
     reading = memory.reading
     if reading.busy:
@@ -238,10 +239,11 @@ def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: Ro
         return NEVER
     if memory.arrived_at is not None:
         return memory.arrived_at + limits.t.docks_s
-    waits = reading.refused if command.doing == "act" else stands(memory)
     pause_s = limits.t.obeys_s * min(memory.tries, MOST_PAUSES)
-    since = memory.asked_at if command.doing == "act" else max(memory.asked_at, memory.moved_at)
-    return since + pause_s if waits else NEVER
+    if reading.refused and reading.taken != (command.id, command.attempt):
+        return memory.asked_at + pause_s
+    waits = command.doing != "act" and stands(memory)
+    return max(memory.asked_at, memory.moved_at) + pause_s if waits else NEVER
 
 
 def _wakes(memory: RobotMemory, limits: RobotLimits) -> Iterator[float]:

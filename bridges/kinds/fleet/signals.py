@@ -107,9 +107,9 @@ class RobotSample(msgspec.Struct, frozen=True):
     took and reports as failed. It may have done a part of it. `path`: the places to which the robot's
     own manager sends it, in turn. `paused`: the robot is paused and waits for a resume. `taken`: the
     last command, as (id, attempt), that the robot or its manager had received and not refused before
-    this reading. It is (0, 0) for none. The core needs it for a stop or pause only. `busy`: the driver
-    has not sent the last command yet, because the robot still has the order of an earlier one. The
-    driver cancels that order, once for each attempt.
+    this reading. It is (0, 0) for none. `busy`: the driver has not sent the last command yet, because
+    the robot still has the order of an earlier one. The driver cancels that order, once for each
+    attempt.
     """
 
     at: Pose

@@ -68,7 +68,7 @@ DOCK_A = goal(0.0, name="charger_a", dock="dock_a")
 @dataclass
 class Story:
     """One robot and its core. `sample` is the reading that the core gets next. `takes`: the robot's
-    manager takes each command before the next reading.
+    manager takes each command before the next reading, if `sample` has no refusal.
 
     `sent` gets an entry (s, command) whenever the command changes.
     """
@@ -109,7 +109,7 @@ class Story:
 
     def _read(self) -> None:
         command = self.memory.command
-        if command is not None and self.takes:
+        if command is not None and self.takes and not self.sample.refused:
             self.sample = replace(self.sample, taken=(command.id, command.attempt))
         self.take(Sampled(self.sample))
 

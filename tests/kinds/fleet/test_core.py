@@ -77,6 +77,21 @@ def test_no_command_is_repeated_to_a_driving_robot() -> None:  # FLEET-3
     assert story.commands == [(0.0, "navigate 7, attempt 1")]
 
 
+def test_a_goal_that_was_refused_is_sent_again_while_the_robot_drives_to_the_earlier_one() -> None:
+    """FLEET-3."""
+    story = driving(7, moving=True).see(1.0).order(Navigate(8, goal(8.0)))
+    story.see(10.0, refused="navigate is refused: busy")
+    assert story.commands[-1] == (11.0, "navigate 8, attempt 2")
+    story.see(60.0, refused="", moving=True)
+    assert story.commands[-1] == (11.0, "navigate 8, attempt 2")
+
+
+def test_a_warning_about_a_command_that_the_robot_carries_out_repeats_nothing() -> None:
+    """A robot on VDA 5050 reports an error that refers to its order, and drives on."""
+    story = driving(7, moving=True).see(60.0, refused="blocked", taken=(7, 1))
+    assert story.commands == [(0.0, "navigate 7, attempt 1")]
+
+
 def test_the_pause_begins_when_the_robot_comes_to_stand() -> None:
     story = driving(7)
     for x in range(1, 10):
