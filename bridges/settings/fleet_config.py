@@ -13,6 +13,8 @@ match:
     reference_coordinates: {L1: {rmf: [[x, y], ...], robot: [[x, y], ...]}}
 
 Older files have `robots:` beside `rmf_fleet:`, with `rmf_config: {charger: {waypoint: charger_a}}`.
+RMF's own reader does not know these. They are for `check --fleet-config`, because an adapter's program
+may read them. `fleet_site.py` refuses them.
 Their `reference_coordinates` have no levels, so one list for `rmf` and one for `robot` serve all
 levels. rmf_demos has these lists below `fleet_manager`. All other keys are ignored. Source:
 open-rmf/fleet_adapter_template, config.yaml and fleet_adapter.py.
@@ -36,6 +38,9 @@ EVERY_LEVEL = ""
 """The level name of reference coordinates that hold for every level."""
 Soc = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Path = tuple[str, ...]
+ROBOTS: Final = ("rmf_fleet", "robots")
+"""The only place where RMF's adapter reads robots. It reads the text `charger` of each robot."""
+OF_MAPPING: Final = ("charger", "waypoint")
 OF_ADAPTER: Final = "is this a fleet adapter's configuration?"
 T = TypeVar("T")
 
@@ -64,7 +69,7 @@ class RobotConfig(msgspec.Struct, frozen=True):
         if isinstance(self.charger, str):
             return ("charger",), self.charger
         if self.charger is not None:
-            return ("charger", "waypoint"), self.charger.waypoint
+            return OF_MAPPING, self.charger.waypoint
         older = self.rmf_config.charger if self.rmf_config else None
         return ("rmf_config", "charger", "waypoint"), older.waypoint if older else None
 
@@ -149,11 +154,8 @@ class FleetFile(msgspec.Struct, frozen=True):
         return self.contents.rmf_fleet
 
     def robots(self) -> Iterator[tuple[Path, str, RobotConfig]]:
-        """Yield each robot's path, name and settings."""
-        for top, found in (
-            (("rmf_fleet", "robots"), self.fleet.robots),
-            (("robots",), self.contents.robots),
-        ):
+        """Yield each robot's path, name and settings. The robots that RMF reads come last."""
+        for top, found in ((("robots",), self.contents.robots), (ROBOTS, self.fleet.robots)):
             for name, robot in found.items():
                 yield (*top, name), name, robot or RobotConfig()
 

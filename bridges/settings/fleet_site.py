@@ -22,7 +22,7 @@ from bridges.kinds.fleet.settings import FleetFiles
 from bridges.kinds.shared.similarity import Similarity, estimate
 from bridges.settings.building_map import MAP
 from bridges.settings.config import Config
-from bridges.settings.fleet_config import FLEET, FleetFile, load_fleet
+from bridges.settings.fleet_config import FLEET, OF_MAPPING, ROBOTS, FleetFile, load_fleet
 from bridges.settings.nav_graph import load_graph
 from bridges.yaml.parsing import Problem, SettingsError, Sort, YamlFile, compose, read
 from bridges.yaml.positions import Spot, below, locate
@@ -224,11 +224,17 @@ class _Comparing:
                 text = f"{where} has no robot '{name}': add it below robots:"
                 self.problems.append(fleet.problem(path, text))
             inner, charger = robot.waypoint()
+            in_place = (*path, *inner) == (*ROBOTS, name, "charger")
+            strict = section.control == "full" or inner == OF_MAPPING
             vertex = graph.called(charger) if charger else None
             known = [v.name for v in graph.vertices if v.name]
             if charger is None:
                 text = f"'{name}' has no charger: RMF's adapter does not add the robot"
                 self.problems.append(fleet.problem(path, text))
+            elif strict and not in_place:
+                line = f"{name}: {{charger: {charger}}}"
+                text = f"RMF's adapter does not read this form: below {': '.join(ROBOTS)} write"
+                self.problems.append(fleet.problem((*path, *inner), f"{text} '{line}'"))
             elif vertex is None:
                 text = f"the graph has no {unknown('waypoint', charger, known)[8:]}"
                 self.problems.append(fleet.problem((*path, *inner), text))

@@ -67,7 +67,7 @@ class FleetCalls(Protocol):
         """Send one request, without retry. Raises HalError."""
 
     def ask(
-        self, path: str, method: http.Method = "POST", body: str | None = None
+        self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
     ) -> dict[str, object]:
         """Send one request, without retry, and return its answer. Raises HalError."""
 
@@ -114,7 +114,7 @@ class HttpRobot:
         self._settings = settings
         self._api = settings.interface()
         self._bus = bus
-        self._sent = (0, 0)
+        self._sent, self._running = (0, 0), 0
         self._refused = ""
         self._unanswered = False
 
@@ -166,6 +166,7 @@ class HttpRobot:
             paused=flag("paused"),
             refused=self._refused,
             unanswered=self._unanswered,
+            taken=(0, 0) if self._refused else self._sent,
         )
 
     def _path(self, answer: Answer, level: str) -> tuple[Pose, ...]:
@@ -217,6 +218,8 @@ class HttpRobot:
 
     def _done(self, command: RobotCommand, refused: str = "", unanswered: bool = False) -> None:
         self._sent = (command.id, command.attempt)
+        if command.doing not in ("pause", "resume"):
+            self._running = command.of or command.id
         self._refused, self._unanswered = refused, unanswered
 
     def _call(self, command: RobotCommand) -> Call | None:
@@ -238,10 +241,11 @@ class HttpRobot:
         given = values(self._settings.theirs(command), self._robot, self._api.units)
         path = path_with(call.path, given)
         body = None if call.body is None else body_with(call.body, given)
+        safe = command.doing in ("stop", "pause")
         if self._api.accepted is None:
-            self._bus.send(path, call.method, body, safe=command.doing in ("stop", "pause"))
+            self._bus.send(path, call.method, body, safe=safe)
             return ""
-        answer = self._bus.ask(path, call.method, body)
+        answer = self._bus.ask(path, call.method, body, safe=safe)
         if json_fields.flag(answer, self._api.accepted):
             return ""
         why = json_fields.clean(str(answer.get("msg") or ""))
@@ -249,10 +253,13 @@ class HttpRobot:
 
     def make_safe(self) -> None:
         """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the
-        robot drives to its last goal."""
+        robot drives to its last goal. Raises DriverError if the manager refuses."""
         dies = self._settings.on_death
-        if dies != "finish" and (call := self._call(RobotCommand(0, dies))):
-            self._send(call, RobotCommand(0, dies))
+        if dies == "finish":
+            return
+        command = RobotCommand(0, dies, of=self._running)
+        if (call := self._call(command)) and (refused := self._send(call, command)):
+            raise DriverError(refused)
 
     def close(self) -> None:
         """Do nothing, because the driver holds no resource."""

@@ -9,12 +9,15 @@
 
 A robot accepts a new order only when it has no order. So the driver cancels an order before it sends
 another one. The robot reports `cancelOrder` as finished when all movement has stopped. `driving` is
-false then too.
+false then too. If the robot has no order, it reports `cancelOrder` as failed.
+
+Messages have QoS 0, so a message can get lost, and a robot may act on it late. Therefore a stop or
+pause counts as taken only when the robot reports it as finished.
 """
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import Meta
@@ -25,8 +28,9 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers import DriverError
 from drivers.driver_type import DriverType
-from drivers.fleet.vda_messages import DIALECTS, Json, Version, action, order
+from drivers.fleet.vda_messages import DIALECTS, Json, Version, action, action_id, order, order_id
 from drivers.fleet.vda_state import (
+    ended,
     errors,
     flag,
     has_order,
@@ -44,6 +48,12 @@ from drivers.hal.mqtt import Heard, MqttBus, MqttSettings
 from drivers.hal.timestamps import utc
 from drivers.json_fields import clean
 
+INSTANT_COMMANDS: Final[Mapping[str, str]] = {
+    "stop": "cancelOrder",
+    "pause": "startPause",
+    "resume": "stopPause",
+}
+"""The instant actions for commands of the core."""
 Age = Annotated[float, Meta(ge=1, le=120, extra={"unit": "s"})]
 TopicPart = Annotated[
     str,
@@ -116,10 +126,11 @@ class VdaRobot:
         self._topics = {topic: settings.topic(topic, name) for topic in topics}
         self._serial = settings.known_as or name
         self._sent, self._acts = (0, 0), False
+        self._order_id = self._instant_id = ""
         self._headers = dict.fromkeys(topics, 0)
         self._state: Json = {}
         self._at: Pose | None = None
-        self._cancelled = ("", 0)
+        self._cancelled, self._waits = (0, 0), False
         self._decoded: dict[str, tuple[object, Json]] = {}
         self._asked = False
         for topic in ("state", "visualization", "connection", "order"):
@@ -142,6 +153,7 @@ class VdaRobot:
         at = self._place(state, heard.at or 0.0, driving)
         power = part(state, self._says.power)
         self._state, self._at = state, at
+        refused, failed = self._in_vain(state)
         return RobotSample(
             at=self._settings.level_of(at),
             battery=number(power, self._says.charge) / 100.0,
@@ -150,42 +162,57 @@ class VdaRobot:
             completed=self._completed(state),
             fault=self._fault(state),
             taken_out=taken_out(state),
-            refused=self._refused(state),
+            refused=refused,
+            failed=failed,
             path=self._path(state),
             paused=flag(state, "paused") if "paused" in state else None,
+            busy=self._waits and has_order(state),
+            taken=self._sent if self._taken(state) else (0, 0),
         )
 
     def write(self, outputs: RobotOutputs) -> None:
         """Send the command once for each attempt. If the robot still has another command's order,
-        cancel that order first."""
+        cancel that order first, also once for each attempt. Raises DriverError if the robot is not
+        connected."""
         command = outputs.command and self._settings.theirs(outputs.command)
-        if command is None or self._sent == (command.id, command.attempt):
+        self._waits = command is not None and self._has_other(command)
+        done = self._cancelled if self._waits else self._sent
+        if command is None or done == (command.id, command.attempt):
             return
-        if command.doing == "stop":
-            self._cancel(command.attempt)
-        elif command.doing in ("pause", "resume"):
-            kind = "startPause" if command.doing == "pause" else "stopPause"
-            self._instant(kind, f"{command.doing}-{command.id}-{command.attempt}-{utc()}", {})
+        self._connected()
+        if self._waits:
+            self._instant("cancelOrder", f"cancel-{command.id}-{command.attempt}", {})
+            self._cancelled = (command.id, command.attempt)
+            return
+        if command.doing in INSTANT_COMMANDS:
+            self._instant_id = f"{command.doing}-{command.id}-{command.attempt}-{utc()}"
+            self._instant(INSTANT_COMMANDS[command.doing], self._instant_id, {})
         elif command.doing == "localize":
             self._localize(command)
         elif not has_order(self._state):
             self._order(command)
-        elif self._ours() != str(command.id):
-            self._cancel(command.attempt)
-            return
         self._sent, self._acts = (command.id, command.attempt), command.doing == "act"
+
+    def _has_other(self, command: RobotCommand) -> bool:
+        """Does the robot have another order than the order that this command needs?"""
+        instant = command.doing in INSTANT_COMMANDS or command.doing == "localize"
+        return not instant and has_order(self._state) and self._ours() != str(command.id)
 
     def _ours(self, state: Json | None = None) -> str:
         """Return the number of the command whose order the robot has. This is the first part of the
         order's id."""
         return text(self._state if state is None else state, "orderId").partition("-")[0]
 
+    def _is_last(self, order: str) -> bool:
+        """Is this the id of the last command's order?"""
+        return order.partition("-")[0] == str(self._sent[0])
+
     def make_safe(self) -> None:
         """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the
-        robot finishes its order."""
-        kinds = {"stop": "cancelOrder", "pause": "startPause"}
-        if kind := kinds.get(self._settings.on_death):
+        robot finishes its order. Raises DriverError if the robot is not connected."""
+        if kind := INSTANT_COMMANDS.get(self._settings.on_death):
             self._instant(kind, f"on-death-{utc()}", {})
+            self._connected()
 
     def close(self) -> None:
         """Do nothing, because the bus ends the connection."""
@@ -277,23 +304,38 @@ class VdaRobot:
                 found.append(told(error))
         return "; ".join(found)
 
-    def _refused(self, state: Json) -> str:
-        """Return the robot's errors and failed actions that refer to the driver's last order."""
-        ours = str(self._sent[0])
-        about = (e for e in errors(state) if ours in {r.partition("-")[0] for r in references(e)})
-        found = [told(error) for error in about]
-        if self._ours(state) == ours:
-            failed = (a for a in order_actions(state) if a.get("actionStatus") == "FAILED")
-            found += [f"the action {clean(str(a.get('actionType')))} has failed" for a in failed]
-        return "; ".join(found)
+    def _in_vain(self, state: Json) -> tuple[str, str]:
+        """Return why the robot has refused the driver's last order, and why an action that it took has
+        failed. Each is "" if this is not so.
 
-    def _cancel(self, attempt: int) -> None:
-        """Cancel the robot's order, once for each attempt."""
-        cancelled = (text(self._state, "orderId"), attempt)
-        if not has_order(self._state) or cancelled == self._cancelled:
-            return
-        self._instant("cancelOrder", f"cancel-{cancelled[0]}-{attempt}", {})
-        self._cancelled = cancelled
+        A state may come too late to show that an action was running. So an action of an order that the
+        robot has taken is never called refused.
+        """
+        if self._waits or not self._is_last(self._order_id):
+            return "", ""
+        ours = {self._order_id, *(f"{what}-{self._order_id}" for what in ("act", "dock", "leave"))}
+        found = [told(error) for error in errors(state) if ours & set(references(error))]
+        if text(state, "orderId") != self._order_id:
+            return "; ".join(found), ""
+        failed = [a for a in order_actions(state) if a.get("actionStatus") == "FAILED"]
+        found += [f"the action {clean(str(a.get('actionType')))} has failed" for a in failed]
+        if not self._acts:
+            return "; ".join(found), ""
+        return "", "; ".join(found) if failed else ""
+
+    def _taken(self, state: Json) -> bool:
+        """Does the state show that the robot has taken the last order, stop or pause?
+
+        A robot that reports a stop as failed has no order. If the state does not show the last order
+        yet, the order may still be on its way, so only a second such report counts.
+        """
+        if self._is_last(self._order_id):
+            return text(state, "orderId") == self._order_id
+        how = ended(state, self._instant_id)
+        if self._instant_id.startswith("pause-"):
+            return how == "FINISHED" or (how == "FAILED" and state.get("paused") is True)
+        knows_order = self._sent[1] > 1 or text(state, "orderId") == self._order_id
+        return not has_order(state) and (how == "FINISHED" or (how == "FAILED" and knows_order))
 
     def _localize(self, command: RobotCommand) -> None:
         assert command.goal is not None
@@ -306,29 +348,31 @@ class VdaRobot:
         assert self._at is not None
         last: list[Json] = []
         if command.doing == "dock" and self._settings.dock_action:
-            last.append(action(self._settings.dock_action, f"dock-{command.id}", {}, "HARD"))
+            last.append(action(self._settings.dock_action, action_id("dock", command), {}, "HARD"))
         if command.doing == "act":
             known = self._settings.actions.get(command.activity)
             if known is None:
                 raise DriverError(f"the YAML has no action '{command.activity}' for this robot")
             given = msgspec.json.decode(command.description)
             parameters = given if isinstance(given, dict) else {"description": given}
-            last.append(action(known.type, f"act-{command.id}", parameters, "HARD"))
+            last.append(action(known.type, action_id("act", command), parameters, "HARD"))
         charging = part(self._state, self._says.power).get("charging")
         first = []
         if charging and command.goal is not None:
-            first.append(action("stopCharging", f"leave-{command.id}", {}, "HARD"))
+            first.append(action("stopCharging", action_id("leave", command), {}, "HARD"))
         node = text(self._state, "lastNodeId")
         within_m = self._settings.limits.arrived_m
         made = order(self._settings.version, command, self._at, node, within_m, (first, last))
         self._publish("order", made)
+        self._order_id = order_id(command)
 
     def _instant(self, kind: str, action_id: str, parameters: Mapping[str, object]) -> None:
         blocking = "NONE" if self._settings.version == "3.0" else "HARD"
         made = action(kind, action_id, parameters, blocking)
-        self._publish("instantActions", {"actions": [made]})
+        stops = kind in ("cancelOrder", "startPause")
+        self._publish("instantActions", {"actions": [made]}, safe=stops)
 
-    def _publish(self, topic: str, message: Json) -> None:
+    def _publish(self, topic: str, message: Json, safe: bool = False) -> None:
         self._headers[topic] += 1
         header: Json = {
             "headerId": self._headers[topic],
@@ -338,7 +382,7 @@ class VdaRobot:
             "serialNumber": self._serial,
         }
         payload = msgspec.json.encode({**header, **message})
-        self._bus.publish(self._topics[topic], payload, qos=0)
+        self._bus.publish(self._topics[topic], payload, qos=0, safe=safe)
 
 
 def claims(settings: VdaRobotSettings) -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -8,7 +8,7 @@ from drivers import DriverError
 from drivers.fleet.vda_messages import Json
 from drivers.json_fields import clean
 
-INSTANT: Final = ("cancel-", "place-", "state-", "on-death", "pause-", "resume-")
+INSTANT: Final = ("cancel-", "stop-", "place-", "state-", "on-death", "pause-", "resume-")
 """The beginnings of the ids that this daemon gives to its instant actions."""
 ENDED: Final = ("FINISHED", "FAILED")
 AUTOMATIC: Final = ("AUTOMATIC", "SEMIAUTOMATIC")
@@ -30,6 +30,14 @@ def order_actions(state: Json) -> Iterator[Json]:
         ours = str(one.get("actionId", ""))
         if ours and not ours.startswith(INSTANT):
             yield one
+
+
+def ended(state: Json, action_id: str) -> str:
+    """Return how an instant action has ended, FINISHED or FAILED. Return "" if it has not ended, or if
+    the robot does not know it."""
+    states = [*listed(state, "actionStates"), *listed(state, "instantActionStates")]
+    found = (str(one.get("actionStatus")) for one in states if one.get("actionId") == action_id)
+    return next((status for status in found if status in ENDED), "")
 
 
 def has_order(state: Json) -> bool:

@@ -108,11 +108,13 @@ class HttpBus(Bus):
         with self._attempt(self._safe_backoff if safe else self._backoff, path):
             self._call(method, url, body)
 
-    def ask(self, path: str, method: Method = "POST", body: str | None = None) -> dict[str, object]:
+    def ask(
+        self, path: str, method: Method = "POST", body: str | None = None, safe: bool = False
+    ) -> dict[str, object]:
         """Send a command as `send` does. Return the JSON object of its answer, which must have status
         200."""
         url = self._base.url(path)
-        with self._attempt(self._backoff, path):
+        with self._attempt(self._safe_backoff if safe else self._backoff, path):
             return json_object(url, *self._call(method, url, body, reads=True))
 
     def insist(self) -> None:

@@ -11,7 +11,7 @@ from bridges.kinds.fleet.places import RobotSite
 from bridges.kinds.fleet.signals import Pose
 from bridges.kinds.shared.similarity import Similarity
 from bridges.messages.definitions import FleetState
-from bridges.settings.fleet_config import load_fleet
+from bridges.settings.fleet_config import Charger, RobotConfig, load_fleet
 from bridges.settings.nav_graph import load_graph
 from bridges.yaml.problems import SettingsError
 from hal_fakes.rmf.lights import (
@@ -63,24 +63,29 @@ class FleetConfiguration:
         config_file: str, nav_graph_path: str, server_uri: str | None = None
     ) -> "FleetConfiguration | None":
         """Return the configuration. Return None if RMF cannot read the configuration file. Raise
-        RuntimeError if RMF cannot read the graph."""
+        RuntimeError if RMF cannot read the graph, or if a charger is no text."""
         try:
-            return FleetConfiguration(config_file, nav_graph_path)
+            found = FleetConfiguration(config_file, nav_graph_path)
         except SettingsError as error:
             if any(problem.file == nav_graph_path for problem in error.problems):
                 raise RuntimeError(str(error.problems[0])) from None
             return None
+        robots = filter(None, found.file.fleet.robots.values())
+        if any(isinstance(robot.charger, Charger) for robot in robots):
+            raise RuntimeError("bad conversion")
+        return found
 
     def add_robot_coordinates_transformation(self, level: str, transform: Similarity) -> None:
         """Add a level's transform."""
         self.transforms[level] = transform
 
     def get_known_robot_configuration(self, robot: str) -> SimpleNamespace | None:
-        """Return a robot's charger."""
-        for _, name, settings in self.file.robots():
-            if name == robot:
-                return SimpleNamespace(compatible_chargers=[settings.waypoint()[1]])
-        return None
+        """Return a robot's charger. Return None for a robot that is not below `rmf_fleet`."""
+        robots = self.file.fleet.robots
+        if robot not in robots:
+            return None
+        charger = (robots[robot] or RobotConfig()).charger
+        return SimpleNamespace(compatible_chargers=[charger] if charger else [])
 
 
 def transformation(rotation: float, scale: float, translation: list[float]) -> Similarity:
@@ -96,7 +101,7 @@ class RobotHandle:
 
     def __init__(self, robot: PatrolRobot, lock: threading.RLock) -> None:
         self.robot = robot
-        self.issues: dict[str, Any] = {}
+        self.issues: list[tuple[str, dict[str, str]]] = []
         self._lock = lock
 
     def update(self, state: RobotState, activity: Any) -> None:
@@ -122,8 +127,9 @@ class RobotHandle:
 
     def create_issue(self, tier: object, category: str, detail: dict[str, str]) -> Any:
         """Note an issue until its ticket is resolved."""
-        self.issues[category] = detail
-        return SimpleNamespace(resolve=lambda message: self.issues.pop(category, None))
+        issue = (category, detail)
+        self.issues.append(issue)
+        return SimpleNamespace(resolve=lambda message: self.issues.remove(issue))
 
 
 class EasyFleet:
@@ -137,8 +143,11 @@ class EasyFleet:
     def add_robot(
         self, name: str, state: RobotState, configuration: Any, callbacks: RobotCallbacks
     ) -> RobotHandle | None:
-        """Add a robot. Return None for a robot that RMF refuses."""
-        if name in self.handles or configuration is None:
+        """Add a robot. Return None for a robot that RMF refuses. Raise TypeError without a
+        configuration, as pybind11 does."""
+        if configuration is None:
+            raise TypeError("add_robot(): incompatible function arguments.\nInvoked with: ...")
+        if name in self.handles or not configuration.compatible_chargers:
             return None
         site = RobotSite(
             self.patrols.graph, self.patrols.transforms, configuration.compatible_chargers[0]

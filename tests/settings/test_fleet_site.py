@@ -207,11 +207,45 @@ def test_a_building_map_is_no_graph(write: Write) -> None:
     assert "is not one" in problems(file)[0]
 
 
-def test_the_older_form_and_the_demos_form_of_config_are_read(write: Write) -> None:
-    older = write(
-        (CONFIG, "AMR01: {charger: wait_1}", "AMR01: {rmf_config: {charger: {waypoint: wait_1}}}")
-    )
-    assert problems(older) == []
+ONE = (
+    "RMF's adapter does not read this form: below rmf_fleet: robots write"
+    " 'AMR01: {charger: wait_1}'"
+)
+
+
+@pytest.mark.parametrize(
+    ("form", "says", "light"),
+    [
+        ("{rmf_config: {charger: {waypoint: wait_1}}}", f"27:36: {ONE}", False),
+        ("{charger: {waypoint: wait_1}}", f"27:23: {ONE}", True),
+    ],
+)
+def test_a_form_that_rmf_does_not_read_is_refused_with_the_line_to_write(
+    write: Write, form: str, says: str, light: bool
+) -> None:
+    changes = [(CONFIG, "AMR01: {charger: wait_1}", f"AMR01: {form}")]
+    assert problems(write(*changes)) == [f"fleet_tiny.yaml:{says}"]
+    texts._texts.clear()
+    ours = (Path(__file__).parents[2] / "config" / "robots_traffic_light.yaml").read_text()
+    file = write(*changes).with_name("light.yaml")
+    file.write_text(ours)
+    assert (problems(file) != []) is light, "RMF throws, whatever the control is"
+
+
+def test_robots_beside_rmf_fleet_are_refused(write: Write) -> None:
+    file = write()
+    text = FILES[CONFIG]
+    robots = text[text.index("  robots:\n") : text.index("# The same points")]
+    beside = "".join(line.removeprefix("  ") for line in robots.splitlines(keepends=True))
+    file.with_name(CONFIG).write_text(text.replace(robots, beside))
+    assert problems(file)[0].endswith(f"{ONE}")
+    texts._texts.clear()
+    file.with_name(CONFIG).write_text(text + beside)
+    assert problems(file) == [], "RMF reads the robots below rmf_fleet"
+
+
+def test_the_demos_form_of_coordinates_is_read(write: Write) -> None:
+    older = write()
     text = FILES[CONFIG]
     pairs = "{rmf: [[0, 0], [1, 0]], robot: [[5, 5], [5, 6]]}"
     pairs = f"\nfleet_manager:\n  reference_coordinates: {pairs}\n"

@@ -23,6 +23,7 @@ STANDS: Final[Mapping[str, str]] = {
     "ROBOT_ON_OTHER_MAP": "is on a map that RMF's graph lacks",
     "ROBOT_NOT_OBEYING": "does not obey",
     "ROBOT_PAUSED_BY_OTHERS": "was paused by somebody else",
+    "ROBOT_ACTION_FAILED": "began its action, and failed",
     "ROBOT_ACTION_UNANSWERED": "may have begun its action, or not",
     "ROBOT_REFUSES": "refuses its command",
     "ROBOT_OFF_GRAPH": "is off the graph",
@@ -78,8 +79,10 @@ def explanation(
         )
         before = (
             f"Its daemon's report: at {said.value('at')}, doing {said.value('doing') or 'nothing'},"
-            f" battery {said.value('battery') or 'unknown'}, new tasks {said.value('new_tasks')}."
+            f" battery {said.value('battery') or 'unknown'}"
         )
+        tasks = said.value("new_tasks")  # missing with `control: traffic_light`
+        before += f", new tasks {tasks}." if tasks else "."
     return Explanation(
         kind="robot",
         device=label(who),

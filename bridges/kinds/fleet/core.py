@@ -9,12 +9,15 @@ FLEET-2. A command is done when the robot is within `arrived_m` of the goal, on 
    robot reports completed commands, it must also have reported this command. Otherwise the robot must
    stand and face in the goal's direction. If a robot reports a command as completed at another place,
    the command is not done, and the report is a fault.
-FLEET-3. If the robot stands for `obeys_s` and the command is not done, the command is sent again. The
-   pauses between attempts grow. An action is sent again only if its manager refused it, because an
-   action must not be done twice. No command is sent again while the robot is paused, takes no orders or
-   reports a fault, because a person may be keeping it there.
-FLEET-4. After a stop or pause was sent, the robot must be seen to stand. Until then the command is sent
-   again every `stops_s`, also to a robot that is not read. A new order replaces a stop.
+FLEET-3. If the robot stands for `obeys_s` and the command is not done, the command is sent again. So is
+   a command that was refused, even while the robot still drives to an earlier goal. The pauses between
+   attempts grow. An action is sent again only if its manager refused it, because an action must not be
+   done twice. No command is sent again while the robot is paused, takes no orders or reports a fault,
+   because a person may be keeping it there.
+FLEET-4. A stop or pause is carried out when the robot or its manager has taken it, and a later reading
+   shows that the robot stands. Until then the command is sent again every `stops_s`, also to a robot
+   that is not read. A new order replaces a stop. While a robot keeps the order of an earlier command,
+   the new command, and with it the cancelling, is also sent again every `stops_s`.
 FLEET-5. RMF gets the robot's place only from a fresh reading. After `stale_after_s` without a reading
    the robot is silent.
 FLEET-6. If the robot is on a map that the graph lacks, RMF gets no place. If the robot is on the map
@@ -31,7 +34,8 @@ FLEET-10. A robot gets no new task while it reports a fault, takes no orders, is
    gets tasks again.
 FLEET-11. If RMF has given up an activity, the activity is stopped.
 FLEET-12. After an operator's reset, the attempts are counted from the beginning, and the command is
-   sent again. An action is sent again only if it was refused, or if nobody knows whether it has begun.
+   sent again. An action is sent again only if it was refused, if it has failed, or if nobody knows
+   whether it has begun.
 
 `light.py` has the rules for a robot that RMF can only pause.
 """
@@ -117,7 +121,7 @@ def _reset(memory: RobotMemory, now: float) -> RobotMemory:
     if memory.command is None:
         return memory
     reading = memory.reading
-    lost = reading is not None and (reading.refused or reading.unanswered)
+    lost = reading and (reading.refused or reading.unanswered or reading.failed)
     if memory.command.doing == "act" and not lost:
         return replace(memory, tries=1)
     return replace(_again(memory, now), tries=1)
@@ -173,12 +177,13 @@ def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemor
 
 
 def _has_stopped(memory: RobotMemory, command: RobotCommand, now: float) -> bool:
-    """Return whether the robot was seen to stand after the stop or pause was sent. A robot that stood
-    before it may just have taken the command that must be stopped."""
-    if not memory.fresh or memory.reading is None or memory.read_at is None:
+    """Return whether the robot was seen to stand after it had taken the stop or pause. A robot that
+    stands without it may just have taken the command that must be stopped."""
+    if not stands(memory):
         return False
+    assert memory.reading is not None
     not_paused = command.doing == "pause" and memory.reading.paused is False
-    return memory.read_at > memory.asked_at and stands(memory, now) and not not_paused
+    return memory.reading.taken == (command.id, command.attempt) and not not_paused
 
 
 def _again(memory: RobotMemory, now: float) -> RobotMemory:
@@ -219,23 +224,26 @@ def _is_there(memory: RobotMemory, command: RobotCommand, now: float, limits: Ro
         return False
     if memory.reading.completed is not None:
         return memory.reading.completed == str(command.id)
-    return stands(memory, now) and faces(memory, command.goal, limits)
+    return stands(memory) and faces(memory, command.goal, limits)
 
 
 def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> float:
-    """Return the time of the next attempt. Return NEVER while the robot moves, and while a person or
-    the robot itself keeps it standing."""
+    """Return the time of the next attempt. Return NEVER while the robot moves by the command, and while
+    a person or the robot itself keeps it standing."""
     assert memory.reading is not None
     reading = memory.reading
+    if reading.busy:
+        return memory.asked_at + limits.t.stops_s
     kept = reading.paused is True or bool(reading.taken_out or reading.fault)
     if kept and command.doing != "resume":
         return NEVER
     if memory.arrived_at is not None:
         return memory.arrived_at + limits.t.docks_s
-    waits = reading.refused if command.doing == "act" else stands(memory, now)
     pause_s = limits.t.obeys_s * min(memory.tries, MOST_PAUSES)
-    since = memory.asked_at if command.doing == "act" else max(memory.asked_at, memory.moved_at)
-    return since + pause_s if waits else NEVER
+    if reading.refused and reading.taken != (command.id, command.attempt):
+        return memory.asked_at + pause_s
+    waits = command.doing != "act" and stands(memory)
+    return max(memory.asked_at, memory.moved_at) + pause_s if waits else NEVER
 
 
 def _wakes(memory: RobotMemory, limits: RobotLimits) -> Iterator[float]:

@@ -74,7 +74,7 @@ def follow(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
     reading = memory.reading
     if reading is None or not memory.fresh or on_other_map(memory, limits):
         return memory
-    light, still = memory.light, stands(memory, now)
+    light, still = memory.light, stands(memory)
     here, told = limits.site.on_rmfs_map(reading.at), reading.path or ()
     astray = still and light.answer is not None and light.answer.says == "error"
     if told != light.told or astray:
@@ -173,7 +173,7 @@ def must_stand(memory: RobotMemory, now: float, limits: RobotLimits) -> bool:
 
 def steer(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
     """Begin a pause or a resume if one is due."""
-    light, command, still = memory.light, memory.command, stands(memory, now)
+    light, command, still = memory.light, memory.command, stands(memory)
     doing = command.doing if command else ""
     paused = memory.reading.paused if memory.reading else None
     if must_stand(memory, now, limits):
@@ -204,7 +204,7 @@ def resumed(memory: RobotMemory, now: float, limits: RobotLimits) -> bool:
     assert memory.reading is not None
     if memory.reading.paused is not None:
         return not memory.reading.paused
-    waits = stands(memory, now)
+    waits = stands(memory)
     return not waits or (not memory.light.path and now >= memory.asked_at + limits.t.stops_s)
 
 
@@ -218,7 +218,7 @@ def question(memory: RobotMemory, now: float, limits: RobotLimits) -> LightQuest
     stopping_m = limits.t.pauses_m
     if not light.path:
         state: Literal["moving", "at", "after"] = "at"
-    elif stands(memory, now):
+    elif stands(memory):
         state = "at" if _apart(light.path[passed], here) <= stopping_m else "after"
     else:
         state = "moving"

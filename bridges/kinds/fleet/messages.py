@@ -55,9 +55,10 @@ def state_message(
 
 def summary(report: RobotReport) -> Mapping[str, str]:
     """Return the robot's state as keys and values for the log, the status file and `watch`."""
+    tasks = {} if report.fit is None else {"new_tasks": "yes" if report.fit else "no"}
     return {
         "at": report.where,
         "doing": report.doing,
         "battery": f"{10 * round(10 * report.battery)} %" if report.read_at is not None else "-",
-        "new_tasks": "yes" if report.fit else "no",
+        **tasks,
     }

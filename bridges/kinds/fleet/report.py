@@ -23,7 +23,8 @@ class RobotReport(msgspec.Struct, frozen=True):
     """The values for RMF's adapter. `at`: the robot's place on its own map, from a fresh reading; None
     if RMF must get no place. `battery`: a fraction of 1. `activity`: the number of the present
     command; 0 without a command. `finished`: the number of the last command that was carried out.
-    `fit`: whether the robot may get new tasks. `light`: for a robot that RMF can only pause.
+    `fit`: whether the robot may get new tasks. RMF gives no tasks to a robot that it can only pause.
+    For such a robot `fit` is None, and `light` has its progress.
 
     `where`: the nearest waypoint, for people. `doing`: the command, for people.
     """
@@ -32,7 +33,7 @@ class RobotReport(msgspec.Struct, frozen=True):
     battery: float = 0.0
     activity: int = 0
     finished: int = 0
-    fit: bool = False
+    fit: bool | None = False
     where: str = ""
     doing: str = ""
     read_at: float | None = None
@@ -49,12 +50,13 @@ def report(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotReport:
     """Report the present state of the robot."""
     found = tuple(faults(memory, now, limits))
     command, reading = memory.command, memory.reading
+    fit = reading is not None and not any(fault.code in UNFIT for fault in found)
     return RobotReport(
         at=_place(memory, limits),
         battery=reading.battery if reading else 0.0,
         activity=command.id if command and command.doing != "stop" else 0,
         finished=memory.finished,
-        fit=reading is not None and not any(fault.code in UNFIT for fault in found),
+        fit=None if limits.light else fit,
         where=_where(memory, limits),
         doing=_light(memory, limits) if limits.light else _doing(memory),
         read_at=memory.read_at,
@@ -144,7 +146,7 @@ def _of_light(memory: RobotMemory, now: float) -> Iterator[Fault]:
         yield Fault("ROBOT_PAUSED_BY_OTHERS", text)
     if light.answer is not None and light.answer.says == "error":
         yield Fault("ROBOT_PASSED_LIGHT", "it is where RMF has not let it go")
-    if not light.path and not reading.path and not stands(memory, now) and memory.fresh:
+    if not light.path and not reading.path and not stands(memory) and memory.fresh:
         yield Fault("ROBOT_WITHOUT_PATH", "it drives, and its manager tells no path")
 
 
@@ -182,6 +184,8 @@ def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterato
     if reading.unanswered and command.doing == "act":
         text = f"nobody knows whether {command.activity} has begun: a reset sends it again"
         yield Fault("ROBOT_ACTION_UNANSWERED", text)
+    if reading.failed and command.doing == "act":
+        yield Fault("ROBOT_ACTION_FAILED", f"{reading.failed}: a reset sends it again")
     if command.goal and reading.completed == str(command.id):
         off_m = off_goal_m(memory, command.goal, limits)
         if off_m > limits.t.arrived_m:
@@ -189,7 +193,11 @@ def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterato
             yield Fault("ROBOT_NOT_THERE", f"it reports arrival, but is {far} its goal")
     if memory.arrived_at is not None and command.goal:
         yield Fault("ROBOT_NOT_CHARGING", f"docked at {command.goal.dock} without a charge")
-    if memory.tries > limits.t.attempts:
+    still = command.doing in ("stop", "pause") and stands(memory)
+    if memory.tries > limits.t.attempts and not still:
         yield Fault("ROBOT_NOT_OBEYING", f"{limits.t.attempts} attempts in vain: {command.doing}")
-    elif command.doing in ("stop", "pause") and memory.tries > 1 and not stands(memory, now):
-        yield Fault("ROBOT_NOT_STOPPING", f"it drives on after a {command.doing}")
+    elif command.doing in ("stop", "pause") and memory.tries > 1:
+        what = "it stands, but has not taken the" if still else "it drives on after a"
+        yield Fault("ROBOT_NOT_STOPPING", f"{what} {command.doing}")
+    elif reading.busy and memory.tries > 1:
+        yield Fault("ROBOT_NOT_STOPPING", "it keeps an earlier order, although that was cancelled")

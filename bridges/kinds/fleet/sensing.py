@@ -4,10 +4,11 @@ from its goal.
 FLEET-SENSING-1. A reading counts only if all its numbers are finite and the battery is between 0 and 1.
    RMF's adapter ignores a battery outside this range, and it plans with a battery that is not a number.
    A battery up to 2 % above full counts as full.
-FLEET-SENSING-2. A reading is old if its own time is not newer than the time of the last reading. A
-   manager sends such readings because it repeats the last reading of a robot that it has lost. If
-   earlier times keep coming for `stale_after_s`, the robot's clock was set back, and the readings count
-   again.
+FLEET-SENSING-2. A reading with the time of the last reading is that reading again, and brings nothing
+   new. If no newer time comes for `stale_after_s`, the manager has lost the robot, and the reading does
+   not count any more, nor after a reading that failed. A reading with an earlier time does not count.
+   If earlier times keep coming for `stale_after_s`, the robot's clock was set back, and the readings
+   count again.
 FLEET-SENSING-3. A robot stands if it reports that it stands. If it does not report this, it stands if
    it has moved less than 3 cm and 3° for a second.
 """
@@ -44,8 +45,10 @@ def take(memory: RobotMemory, sample: RobotSample, now: float, limits: RobotLimi
         return replace(memory, fresh=False, unread=reason)
     said_at, before = sample.said_at, memory.said_at
     if said_at is not None and before is not None and said_at <= before:
-        set_back = said_at < before and now >= memory.said_new_at + limits.t.stale_after_s
-        if not set_back:
+        old = now >= memory.said_new_at + limits.t.stale_after_s
+        if said_at == before and memory.fresh and not old:
+            return memory
+        if said_at == before or not old:
             reason = "its manager repeats an old reading"
             return replace(memory, fresh=False, unread=reason)
     sample = replace(sample, battery=min(1.0, sample.battery))
@@ -90,13 +93,13 @@ def on_other_map(memory: RobotMemory, limits: RobotLimits) -> bool:
     return bool(memory.reading and graph.vertices) and not _known(memory.reading.at, limits)  # type: ignore[union-attr]
 
 
-def stands(memory: RobotMemory, now: float) -> bool:
+def stands(memory: RobotMemory) -> bool:
     """Return whether a fresh reading shows that the robot stands."""
-    if memory.reading is None or not memory.fresh:
+    if memory.reading is None or memory.read_at is None or not memory.fresh:
         return False
     if memory.reading.moving is not None:
         return not memory.reading.moving
-    return memory.moved_at > AGES_AGO and now >= memory.moved_at + STANDS_S
+    return memory.moved_at > AGES_AGO and memory.read_at >= memory.moved_at + STANDS_S
 
 
 def off_goal_m(memory: RobotMemory, goal: Goal, limits: RobotLimits) -> float:

@@ -103,8 +103,13 @@ class RobotSample(msgspec.Struct, frozen=True):
     completed; "" for none. `fault`: the robot's own fault. `taken_out`: the reason why the robot takes
     no orders (manual mode, teaching). `said_at`: the robot's own time or counter of this reading.
     `refused`: the manager's refusal of the last command. `unanswered`: the last command was an action,
-    and nobody knows whether it has begun. `path`: the places to which the robot's own manager sends it,
-    in turn. `paused`: the robot is paused and waits for a resume.
+    and nobody knows whether it has begun. `failed`: the last command was an action, which the robot
+    took and reports as failed. It may have done a part of it. `path`: the places to which the robot's
+    own manager sends it, in turn. `paused`: the robot is paused and waits for a resume. `taken`: the
+    last command, as (id, attempt), that the robot or its manager had received and not refused before
+    this reading. It is (0, 0) for none. `busy`: the driver has not sent the last command yet, because
+    the robot still has the order of an earlier one. The driver cancels that order, once for each
+    attempt.
     """
 
     at: Pose
@@ -119,6 +124,9 @@ class RobotSample(msgspec.Struct, frozen=True):
     unanswered: bool = False
     path: tuple[Pose, ...] | None = None
     paused: bool | None = None
+    taken: tuple[int, int] = (0, 0)
+    busy: bool = False
+    failed: str = ""
 
 
 Doing = Literal["navigate", "dock", "localize", "act", "stop", "pause", "resume"]

@@ -24,6 +24,7 @@ from bridges.settings.fleet_site import FleetSite
 from bridges.transports.transport import TransportError
 
 MAKE_S: Final = 3.0
+NOT_PASSED: Final = "RMF's adapter is of another version, or config.yaml does not have the robot"
 
 
 def installed() -> ModuleType:
@@ -74,7 +75,10 @@ class FleetAdapter:
         """
         easy = self._rmf.easy_full_control
         files = self._site.config_file, self._site.graph_file
-        configuration = easy.FleetConfiguration.from_config_files(*files, self._uri)
+        try:
+            configuration = easy.FleetConfiguration.from_config_files(*files, self._uri)
+        except RuntimeError as error:
+            raise TransportError(f"RMF's adapter refuses {' or '.join(files)}: {error}") from None
         if configuration is None:
             raise TransportError(f"RMF's adapter refuses {files[0]}; its own log has the reason")
         for level in self._site.graph.levels():
@@ -109,6 +113,8 @@ class FleetAdapter:
                 robot.update(report)
         except RuntimeError as error:  # an exception of C++
             self.failed[name] = str(error)
+        except TypeError as error:  # pybind11 does not take a value; its text has many lines
+            self.failed[name] = f"{NOT_PASSED}: {str(error).partition(chr(10))[0]}"
 
     def _robot(self, name: str) -> RmfRobot | RmfLight:
         if self._light:

@@ -7,13 +7,15 @@ the robot's bus.
 """
 
 import json
+import re
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final
 
 from bridges.kinds.fleet.report import RobotReport
 from bridges.kinds.fleet.signals import Act, Goal, Localize, Navigate, Order, Pose, Stop
+from bridges.kinds.shared.decision import Fault
 
 GIVEN_UP_S: Final = 2.0
 """The time (s) for which the robot may go on after RMF has ended its activity. Often RMF orders the
@@ -21,6 +23,8 @@ next activity a moment later, and then the robot must not stop."""
 AGAIN_S: Final = 10.0
 """The pause (s) before the next attempt, after RMF has not taken a robot."""
 NOT_TAKEN: Final = "RMF does not take the robot: is it near a lane, on a level of the graph?"
+COUNTS: Final = re.compile(r"\d+(\.\d+)? (s|m)\b")
+"""The seconds and metres in a fault's detail. An issue lasts while only these change."""
 Put = Callable[[str, Order], None]
 
 
@@ -35,7 +39,7 @@ class RmfRobot:
         self._given_up_at: float | None = None
         self._fit = True
         self._commissioned: Any = None
-        self._issues: dict[str, Any] = {}
+        self._issues: dict[tuple[str, str], Any] = {}
         self._again_at = 0.0
 
     def add(self, fleet: Any, configuration: Any, report: RobotReport) -> str:
@@ -65,8 +69,8 @@ class RmfRobot:
             self._give_up(number)
         more = self.handle.more()
         if more is not None:
-            self._commission(more, report.fit)
-            self._issue(more, {fault.code: fault.detail for fault in report.faults})
+            self._commission(more, bool(report.fit))
+            self._issue(more, report.faults)
 
     def _state(self, report: RobotReport) -> Any:
         assert report.at is not None
@@ -99,12 +103,16 @@ class RmfRobot:
         more.set_commission(none)
         more.reassign_dispatched_tasks()
 
-    def _issue(self, more: Any, faults: Mapping[str, str]) -> None:
-        for code in self._issues.keys() - faults.keys():
-            self._issues.pop(code).resolve({})
-        for code in faults.keys() - self._issues.keys():
+    def _issue(self, more: Any, faults: Iterable[Fault]) -> None:
+        """Resolve the issues whose fault has gone or tells something else now, and create the new
+        ones."""
+        present = {(fault.code, COUNTS.sub("", fault.detail)): fault for fault in faults}
+        for key in self._issues.keys() - present.keys():
+            self._issues.pop(key).resolve({})
+        for key in present.keys() - self._issues.keys():
             tier = self._rmf.robot_update_handle.Tier.Error
-            self._issues[code] = more.create_issue(tier, code, {"detail": faults[code]})
+            detail = {"detail": present[key].detail}
+            self._issues[key] = more.create_issue(tier, present[key].code, detail)
 
     def _begun(self, execution: Any) -> int:
         with self._lock:

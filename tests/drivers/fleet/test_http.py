@@ -183,6 +183,33 @@ def test_a_robot_in_manual_mode_refuses() -> None:
         assert bench.read().refused == ""
 
 
+def test_a_stop_is_taken_when_the_manager_has_accepted_it() -> None:
+    with fleet(DEMOS) as bench:
+        plant = bench.plants["AMR01"]
+        stop = RobotCommand(13, "stop", of=12)
+        plant.fail("server", "off")
+        with pytest.raises(DriverError):
+            bench.send(stop)
+        plant.fail("server", None)
+        assert bench.read().taken == (0, 0)
+        plant.press("manual", True, plant.now)
+        bench.send(stop)
+        assert bench.read().taken == (0, 0)
+        plant.press("manual", False, plant.now)
+        bench.send(msgspec.structs.replace(stop, attempt=2))
+        assert bench.read().taken == (13, 2)
+
+
+def test_a_stop_does_not_wait_for_the_pause_after_a_failed_reading() -> None:
+    with fleet(DEMOS) as bench:
+        bench.plants["AMR01"].fail("server", "off")
+        with pytest.raises(DriverError):
+            bench.read()
+        bench.plants["AMR01"].fail("server", None)
+        bench.drivers["AMR01"].write(RobotOutputs(RobotCommand(13, "stop", of=12)))
+        assert bench.read().taken == (13, 1)
+
+
 def test_a_map_of_another_name_is_its_level() -> None:
     renamed = msgspec.structs.replace(DEMOS, maps={"L1": "ground floor"})
     with fleet(renamed) as bench:
@@ -251,7 +278,7 @@ def test_an_action_takes_its_values_from_the_description() -> None:
     sent: list[tuple[str, str, str | None]] = []
 
     class Heard:
-        def ask(self, path: str, method: str, body: str | None) -> dict[str, object]:
+        def ask(self, path: str, method: str, body: str | None, safe: bool) -> dict[str, object]:
             sent.append((method, path, body))
             return {"success": True}
 
@@ -287,6 +314,28 @@ def test_a_death_leaves_the_robot_driving_unless_the_yaml_says_stop() -> None:
         stops = msgspec.structs.replace(DEMOS, on_death="stop")
         HttpRobot("AMR01", stops, bench.bus).make_safe()
         assert [e.signal for e in bench.plants["AMR01"].edges if e.what == "relay"] == ["stop"]
+
+
+def test_a_stop_at_death_that_the_manager_refuses_is_an_error() -> None:
+    with fleet(msgspec.structs.replace(DEMOS, on_death="stop")) as bench:
+        bench.plants["AMR01"].press("manual", True, bench.plants["AMR01"].now)
+        with pytest.raises(DriverError, match="stop is refused: the robot is in manual mode"):
+            bench.drivers["AMR01"].make_safe()
+
+
+@pytest.mark.parametrize("last", [to(4.0), RobotCommand(13, "stop", of=12)])
+def test_a_stop_at_death_names_the_command_that_it_stops(last: RobotCommand) -> None:
+    sent: list[str] = []
+
+    class Heard:
+        def ask(self, path: str, method: str, body: str | None, safe: bool) -> dict[str, object]:
+            sent.append(path)
+            return {"success": True}
+
+    driver = HttpRobot("AMR01", msgspec.structs.replace(DEMOS, on_death="stop"), Heard())  # type: ignore[arg-type]
+    driver.write(RobotOutputs(last))
+    driver.make_safe()
+    assert "running_cmd_id=12" in sent[-1]
 
 
 YAML = """\

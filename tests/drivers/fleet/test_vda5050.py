@@ -230,6 +230,7 @@ class Scripted:
     def __init__(self) -> None:
         self.clock = Time()
         self.said: dict[str, Any] = {}
+        self.sent: list[dict[str, Any]] = []
 
     def listen(self, topic: str) -> None:
         pass
@@ -243,6 +244,20 @@ class Scripted:
     def fresh(self, topic: str, stale_after_s: float) -> Any:
         return self.heard(topic)
 
+    def publish(self, topic: str, payload: bytes, qos: int, safe: bool) -> None:
+        self.sent.append(json.loads(payload))
+
+    @property
+    def ids(self) -> list[str]:
+        """Return the ids of all orders and the types of all instant actions that were sent."""
+        return [one.get("orderId") or one["actions"][0]["actionType"] for one in self.sent]
+
+    def acts(self, status: str, **changes: Any) -> None:
+        """Let the robot report the last instant action with this status."""
+        last = self.sent[-1]["actions"][0]
+        state = {**last, "actionStatus": status}
+        self.says("state", {**STATE, **changes, "actionStates": [state]})
+
     def says(self, what: str, message: dict[str, Any]) -> None:
         from drivers.hal.mqtt import Heard
 
@@ -252,6 +267,7 @@ class Scripted:
 
 STATE: dict[str, Any] = {
     "orderId": "",
+    "lastNodeId": "",
     "nodeStates": [],
     "edgeStates": [],
     "actionStates": [],
@@ -264,9 +280,10 @@ STATE: dict[str, Any] = {
 }
 
 
-def scripted(**changes: Any) -> tuple[Scripted, VdaRobot]:
+def scripted(actions: Any = None, **changes: Any) -> tuple[Scripted, VdaRobot]:
     bus = Scripted()
-    driver = VdaRobot("AMR01", VdaRobotSettings(manufacturer="acme"), bus)  # type: ignore[arg-type]
+    settings = VdaRobotSettings(manufacturer="acme", actions=actions or {})
+    driver = VdaRobot("AMR01", settings, bus)  # type: ignore[arg-type]
     bus.says("state", {**STATE, **changes})
     return bus, driver
 
@@ -307,12 +324,184 @@ def test_a_state_without_a_needed_field_names_it(field: str) -> None:
         driver.read()
 
 
-def test_a_failed_action_refuses() -> None:
-    failed = {"actionId": "act-12", "actionType": "startCleaning", "actionStatus": "FAILED"}
-    _, driver = scripted(orderId="12", actionStates=[failed], driving=False)
-    driver._sent, driver._acts = (12, 1), True
+def sent_to_clean() -> tuple[Scripted, VdaRobot]:
+    """Return a robot that was sent the action `clean`."""
+    actions = {"clean": VdaActionSettings(type="startCleaning")}
+    bus, driver = scripted(driving=False, actions=actions)
+    driver.read()
+    driver.write(RobotOutputs(RobotCommand(12, "act", activity="clean")))
+    return bus, driver
+
+
+def clean(status: str, attempt: str = "", **changes: Any) -> dict[str, Any]:
+    """Return a state with the action of this attempt."""
+    one = {"actionId": f"act-12{attempt}", "actionType": "startCleaning", "actionStatus": status}
+    order = f"12{attempt}"
+    return {**STATE, "driving": False, "orderId": order, "actionStates": [one], **changes}
+
+
+def in_vain(driver: VdaRobot) -> tuple[str, str, str | None]:
     sample = driver.read()
-    assert (sample.refused, sample.completed) == ("the action startCleaning has failed", "")
+    return sample.refused, sample.failed, sample.completed
+
+
+def test_an_action_that_the_robot_took_fails_and_is_not_refused() -> None:
+    bus, driver = sent_to_clean()
+    error = {"errorType": "brush", "errorLevel": "WARNING"}
+    error["errorReferences"] = [{"referenceKey": "orderId", "referenceValue": "12"}]  # type: ignore[assignment]
+    bus.says("state", clean("RUNNING", errors=[error]))
+    assert in_vain(driver) == ("", "", "")
+    bus.says("state", clean("FAILED", errors=[error]))
+    assert in_vain(driver) == ("", "brush; the action startCleaning has failed", "")
+    driver.write(RobotOutputs(RobotCommand(12, "act", 2, activity="clean")))
+    assert in_vain(driver) == ("", "", ""), "the failure was that of the first attempt"
+    ids = [one["nodes"][0]["actions"][0]["actionId"] for one in bus.sent]
+    assert ids == ["act-12", "act-12-2"]
+    bus.says("state", clean("FINISHED", "-2"))
+    assert in_vain(driver) == ("", "", "12")
+
+
+@pytest.mark.parametrize("about", ["12", "act-12"])
+def test_an_error_about_an_order_that_the_robot_has_not_taken_is_a_refusal(about: str) -> None:
+    bus, driver = sent_to_clean()
+    reference = {"referenceKey": "id", "referenceValue": about}
+    error = {"errorType": "orderError", "errorLevel": "WARNING", "errorReferences": [reference]}
+    bus.says("state", {**STATE, "driving": False, "errors": [error]})
+    assert in_vain(driver) == ("orderError", "", "")
+    driver.write(RobotOutputs(RobotCommand(12, "act", 2, activity="clean")))
+    assert in_vain(driver) == ("", "", ""), "the error is about the first attempt"
+
+
+def test_an_action_that_a_stop_has_ended_is_neither_refused_nor_failed() -> None:
+    bus, driver = sent_to_clean()
+    bus.says("state", clean("RUNNING"))
+    driver.read()
+    driver.write(RobotOutputs(STOP))
+    bus.says("state", clean("FAILED"))
+    assert in_vain(driver) == ("", "", "")
+
+
+STOP = RobotCommand(13, "stop", of=12)
+UNDER_WAY = {"orderId": "12", "nodeStates": [{"nodeId": "pantry", "sequenceId": 2}]}
+
+
+def told_to_stop() -> tuple[Scripted, VdaRobot]:
+    """Return a robot that was sent to a goal, and told to stop before it has taken the goal's order."""
+    bus, driver = scripted(driving=False)
+    driver.read()
+    driver.write(RobotOutputs(to(8.0)))
+    driver.read()
+    driver.write(RobotOutputs(STOP))
+    return bus, driver
+
+
+def test_a_stop_goes_out_before_a_state_shows_the_order_and_counts_when_the_robot_has_obeyed() -> (
+    None
+):
+    bus, driver = told_to_stop()
+    assert bus.ids == ["12", "cancelOrder"]
+    assert driver.read().taken == (0, 0), "the old state, read again"
+    bus.says("state", {**STATE, **UNDER_WAY})
+    assert driver.read().taken == (0, 0), "the order arrived after the stop was sent"
+    bus.acts("RUNNING", **UNDER_WAY)
+    assert driver.read().taken == (0, 0)
+    bus.acts("FINISHED", orderId="12", driving=False)
+    assert driver.read().taken == (13, 1)
+
+
+def test_a_stop_that_overtakes_its_order_is_sent_again() -> None:
+    bus, driver = told_to_stop()
+    bus.acts("FAILED", driving=False)
+    assert driver.read().taken == (0, 0), "the order may still be on its way"
+    driver.write(RobotOutputs(msgspec.structs.replace(STOP, attempt=2)))
+    assert bus.ids == ["12", "cancelOrder", "cancelOrder"]
+    assert bus.sent[1]["actions"][0]["actionId"] != bus.sent[2]["actions"][0]["actionId"]
+    bus.acts("FAILED", driving=False)
+    assert driver.read().taken == (13, 2)
+
+
+def test_a_stop_of_a_completed_order_counts_although_the_robot_calls_it_failed() -> None:
+    bus, driver = told_to_stop()
+    bus.acts("FAILED", orderId="12", driving=False)
+    assert driver.read().taken == (13, 1)
+
+
+@pytest.mark.parametrize(
+    ("status", "paused", "taken"),
+    [
+        ("RUNNING", True, False),
+        ("FINISHED", True, True),
+        ("FAILED", False, False),
+        ("FAILED", True, True),
+    ],
+)
+def test_a_pause_counts_when_the_robot_has_obeyed(status: str, paused: bool, taken: bool) -> None:
+    bus, driver = scripted(driving=False, paused=True)
+    driver.read()
+    driver.write(RobotOutputs(RobotCommand(3, "pause")))
+    assert driver.read().taken == (0, 0), "the old state, read again"
+    bus.acts(status, driving=False, paused=paused)
+    assert driver.read().taken == ((3, 1) if taken else (0, 0))
+
+
+def test_an_earlier_order_is_cancelled_at_each_attempt_until_the_robot_has_given_it_up() -> None:
+    bus, driver = scripted(**UNDER_WAY)
+    driver.read()
+    for attempt in (1, 1, 2):
+        driver.write(RobotOutputs(to(3.0, 14, attempt=attempt)))
+        assert driver.read().busy
+    assert bus.ids == ["cancelOrder", "cancelOrder"]
+    assert bus.sent[0]["actions"][0]["actionId"] != bus.sent[1]["actions"][0]["actionId"]
+    bus.acts("FINISHED", orderId="12", driving=False)
+    assert not driver.read().busy
+    driver.write(RobotOutputs(to(3.0, 14, attempt=2)))
+    assert bus.ids[2:] == ["14-2"]
+    assert not driver.read().busy
+
+
+def test_an_order_that_the_robot_took_late_is_cancelled_too() -> None:
+    """RMF gave two goals one after the other. The robot refuses the second order."""
+    bus, driver = scripted(driving=False)
+    for command in (to(8.0), to(3.0, 14)):
+        driver.read()
+        driver.write(RobotOutputs(command))
+    bus.says("state", {**STATE, **UNDER_WAY})
+    driver.read()
+    driver.write(RobotOutputs(to(3.0, 14)))
+    assert bus.ids == ["12", "14", "cancelOrder"]
+    assert driver.read().busy
+
+
+def test_an_order_of_the_robots_own_manager_keeps_no_pause_waiting() -> None:
+    bus, driver = scripted(**{**UNDER_WAY, "orderId": "mission-3"})
+    driver.read()
+    driver.write(RobotOutputs(RobotCommand(3, "pause")))
+    assert (bus.ids, driver.read().busy) == (["startPause"], False)
+
+
+def test_nothing_is_sent_to_a_robot_that_is_not_connected() -> None:
+    bus, driver = scripted(driving=False)
+    driver.read()
+    bus.says("connection", {"connectionState": "CONNECTIONBROKEN"})
+    for command in (to(8.0), STOP, RobotCommand(3, "pause")):
+        with pytest.raises(DriverError, match="not connected to the broker: CONNECTIONBROKEN"):
+            driver.write(RobotOutputs(command))
+    assert bus.ids == []
+    bus.says("connection", {"connectionState": "ONLINE"})
+    driver.write(RobotOutputs(STOP))
+    assert bus.ids == ["cancelOrder"]
+
+
+def test_a_stop_at_death_of_a_robot_that_is_not_connected_is_an_error() -> None:
+    bus = Scripted()
+    settings = VdaRobotSettings(manufacturer="acme", on_death="stop")
+    driver = VdaRobot("AMR01", settings, bus)  # type: ignore[arg-type]
+    bus.says("connection", {"connectionState": "OFFLINE"})
+    with pytest.raises(DriverError, match="not connected to the broker: OFFLINE"):
+        driver.make_safe()
+    bus.says("connection", {"connectionState": "ONLINE"})
+    driver.make_safe()
+    assert bus.ids == ["cancelOrder", "cancelOrder"]
 
 
 def test_our_orders_are_what_the_standard_asks_for() -> None:

@@ -67,7 +67,8 @@ DOCK_A = goal(0.0, name="charger_a", dock="dock_a")
 
 @dataclass
 class Story:
-    """One robot and its core. `sample` is the reading that the core gets next.
+    """One robot and its core. `sample` is the reading that the core gets next. `takes`: the robot's
+    manager takes each command before the next reading, if `sample` has no refusal.
 
     `sent` gets an entry (s, command) whenever the command changes.
     """
@@ -75,6 +76,7 @@ class Story:
     limits: RobotLimits = LIMITS
     sample: RobotSample = RobotSample(at(0.0), 0.8)
     now: float = 100.0
+    takes: bool = True
     sent: list[tuple[float, RobotCommand | None]] = field(default_factory=list)
     reports: list[RobotReport] = field(default_factory=list)
 
@@ -99,11 +101,17 @@ class Story:
         """Let the core read this sample once. With `for_s` it reads the sample again and again for
         `for_s` seconds."""
         self.sample = replace(self.sample, **changes)
-        self.take(Sampled(self.sample))
+        self._read()
         for _ in range(round(for_s / SCAN_S)):
             self.now += SCAN_S
-            self.take(Sampled(self.sample))
+            self._read()
         return self
+
+    def _read(self) -> None:
+        command = self.memory.command
+        if command is not None and self.takes and not self.sample.refused:
+            self.sample = replace(self.sample, taken=(command.id, command.attempt))
+        self.take(Sampled(self.sample))
 
     def silence(self, for_s: float) -> "Story":
         """Let each reading fail for `for_s` seconds."""
@@ -114,7 +122,7 @@ class Story:
 
     def order(self, order: Order) -> "Story":
         """Let the core read the robot, and then get this order from RMF."""
-        self.take(Sampled(self.sample))
+        self._read()
         return self.take(order)
 
     @property

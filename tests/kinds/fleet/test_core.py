@@ -77,6 +77,21 @@ def test_no_command_is_repeated_to_a_driving_robot() -> None:  # FLEET-3
     assert story.commands == [(0.0, "navigate 7, attempt 1")]
 
 
+def test_a_goal_that_was_refused_is_sent_again_while_the_robot_drives_to_the_earlier_one() -> None:
+    """FLEET-3."""
+    story = driving(7, moving=True).see(1.0).order(Navigate(8, goal(8.0)))
+    story.see(10.0, refused="navigate is refused: busy")
+    assert story.commands[-1] == (11.0, "navigate 8, attempt 2")
+    story.see(60.0, refused="", moving=True)
+    assert story.commands[-1] == (11.0, "navigate 8, attempt 2")
+
+
+def test_a_warning_about_a_command_that_the_robot_carries_out_repeats_nothing() -> None:
+    """A robot on VDA 5050 reports an error that refers to its order, and drives on."""
+    story = driving(7, moving=True).see(60.0, refused="blocked", taken=(7, 1))
+    assert story.commands == [(0.0, "navigate 7, attempt 1")]
+
+
 def test_the_pause_begins_when_the_robot_comes_to_stand() -> None:
     story = driving(7)
     for x in range(1, 10):
@@ -125,6 +140,16 @@ def test_an_action_without_an_answer_waits_for_a_person() -> None:
     assert story.commands[-1] == (60.0, "act 9, attempt 2")
 
 
+def test_an_action_that_failed_waits_for_a_person() -> None:  # FLEET-3, FLEET-12
+    story = Story().see(completed="", moving=False).order(Act(9, "clean"))
+    story.see(300.0, failed="the action clean has failed")
+    assert story.commands == [(0.0, "act 9, attempt 1")]
+    text = "the action clean has failed: a reset sends it again"
+    assert story.report.faults == (Fault("ROBOT_ACTION_FAILED", text),)
+    story.take(OperatorReset())
+    assert story.commands[-1] == (300.0, "act 9, attempt 2")
+
+
 def test_a_new_order_replaces_the_old_one() -> None:  # FLEET-1
     story = driving(7, completed="", moving=True).see(1.0, at=at(1.0))
     story.order(Navigate(8, goal(8.0)))
@@ -162,8 +187,29 @@ def test_a_robot_that_has_not_moved_off_yet_is_stopped_too() -> None:  # FLEET-4
     """It stood before the stop, but the command that is stopped may already be on its way."""
     story = driving(7, moving=False).see(0.5).order(Stop(8, of=7))
     assert story.commands[-1] == (0.5, "stop 8, attempt 1")
-    story.see(SCAN_S)
-    assert story.commands[-1] == (0.625, "none")
+    story.now += SCAN_S
+    assert story.see().commands[-1] == (0.625, "none")
+
+
+def test_a_stop_that_was_not_taken_is_sent_again_although_the_robot_stands() -> None:  # FLEET-4
+    """It waits behind a person, and drives off when the person has gone."""
+    story = driving(7, moving=False).order(Stop(8, of=7))
+    story.takes = False
+    story.see(30.0)
+    assert [words for _, words in story.commands[1:4]] == [
+        "stop 8, attempt 1",
+        "stop 8, attempt 2",
+        "stop 8, attempt 3",
+    ]
+    text = "it stands, but has not taken the stop"
+    assert story.report.faults == (Fault("ROBOT_NOT_STOPPING", text),)
+    assert story.report.fit, "RMF's next order replaces the stop"
+    story.see(1.0, moving=True)
+    assert story.faults == ["ROBOT_NOT_OBEYING"]
+    story.see(taken=(8, 3), moving=False)
+    assert story.memory.command is not None, "the robot may have driven since that stop"
+    story.takes = True
+    assert story.see(3.0).commands[-1][1] == "none"
 
 
 def test_a_stop_is_sent_again_to_a_robot_that_is_not_read() -> None:  # FLEET-4
@@ -211,6 +257,27 @@ def test_a_stop_without_a_word_about_motion_is_believed_after_a_second_of_standi
 def test_a_stop_of_an_earlier_command_stops_nothing() -> None:
     story = driving(7, moving=True).order(Navigate(8, PANTRY)).order(Stop(9, of=7))
     assert story.commands[-1] == (0.0, "navigate 8, attempt 1")
+
+
+def test_a_robot_that_keeps_an_earlier_order_gets_the_new_command_again() -> None:  # FLEET-4
+    """The driver cancels the earlier order at each attempt. A message of VDA 5050 can get lost."""
+    story = driving(7, moving=True).order(Navigate(8, goal(8.0))).see(2.875, busy=True)
+    assert (len(story.commands), story.faults) == (2, [])
+    story.see(0.125)
+    assert story.commands[-1] == (3.0, "navigate 8, attempt 2")
+    text = "it keeps an earlier order, although that was cancelled"
+    assert story.report.faults == (Fault("ROBOT_NOT_STOPPING", text),)
+    story.see(3.0, moving=False, fault="emergency stop")
+    assert story.commands[-1] == (6.0, "navigate 8, attempt 3")
+    story.see(100.0, busy=False, moving=True, fault="")
+    assert (story.commands[-1], story.faults) == ((6.0, "navigate 8, attempt 3"), [])
+
+
+def test_an_action_that_waits_for_an_earlier_order_is_no_action_that_was_sent() -> None:
+    story = driving(7, completed="", moving=True).order(Act(8, "clean")).see(3.0, busy=True)
+    assert story.commands[-1] == (3.0, "act 8, attempt 2")
+    story.see(60.0, busy=False)
+    assert story.commands[-1] == (3.0, "act 8, attempt 2")
 
 
 def test_a_new_goal_replaces_a_stop() -> None:  # FLEET-4

@@ -213,7 +213,7 @@ def test_a_reading_that_succeeds_again_ends_the_reason_of_the_failure() -> None:
     story.now += 5.0
     story.take(OperatorReset())
     assert story.report.faults == (Fault("ROBOT_SILENT", "no reading for 5.0 s"),)
-    old = Story().see(said_at=50.0).see(0.125)
+    old = Story().see(said_at=50.0).see(said_at=49.0)
     assert old.report.faults == (Fault("ROBOT_NOT_READ", "its manager repeats an old reading"),)
 
 

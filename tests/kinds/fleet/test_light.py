@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.fleet.keep import KEEPING
 from bridges.kinds.fleet.light import LightQuestion
+from bridges.kinds.fleet.messages import summary
 from bridges.kinds.fleet.signals import LightAnswer, Pose, RobotSample, Says
 from bridges.kinds.shared.decision import Fault, OperatorReset
 from tests.kinds.fleet.story import LIMITS, SCAN_S, SITE, Story, at
@@ -103,13 +104,22 @@ def test_a_path_over_a_lift_goes_on_at_the_other_floor() -> None:
     assert asked(story) == (1, 2, "moving")
 
 
+def test_nothing_is_told_of_new_tasks_because_rmf_gives_such_a_robot_none() -> None:
+    assert summary(started().report) == {
+        "at": "L1 charger_a",
+        "doing": "path to L1 lift1_L1, at checkpoint 0 of 3, RMF's light: resume",
+        "battery": "80 %",
+    }
+
+
 # ---- when the robot is paused (FLEET-LIGHT-2)
 
 
 def test_without_an_answer_it_is_paused() -> None:  # FLEET-LIGHT-2
     story = standing(moving=True)
     assert story.commands == [(0.0, "pause 1, attempt 1")]
-    story.see(SCAN_S, moving=False, paused=True)
+    story.now += SCAN_S
+    story.see(moving=False, paused=True)
     assert story.commands[-1] == (SCAN_S, "none")
 
 

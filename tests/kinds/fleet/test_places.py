@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from bridges.kinds.fleet.places import off_line_m
-from bridges.kinds.fleet.signals import Localize, Pose
+from bridges.kinds.fleet.signals import Localize, Pose, Stop
 from bridges.kinds.shared.decision import Fault, Suspended
 from tests.kinds.fleet.story import GRAPH, SITE, Story, at, driving, goal
 
@@ -63,12 +63,27 @@ def test_a_battery_a_little_above_full_is_full() -> None:  # FLEET-SENSING-1
 
 
 def test_an_old_reading_does_not_count() -> None:  # FLEET-SENSING-2
-    story = Story().see(said_at=50.0).see(1.0)
-    assert story.report.at is None
-    assert story.faults == ["ROBOT_NOT_READ"]
-    story.see(4.0)
-    assert story.faults == ["ROBOT_SILENT"]
+    story = Story().see(said_at=50.0).see(4.875)
+    assert story.faults == []
+    story.see(0.125)
+    assert (story.report.at, story.faults) == (None, ["ROBOT_SILENT"])
     assert story.see(said_at=56.0).report.at == at(0.0)
+
+
+def test_a_time_that_is_slower_than_the_readings_is_no_fault_and_brings_no_new_place() -> None:
+    """FLEET-SENSING-2. The manager counts whole seconds."""
+    story = Story().see(said_at=50.0)
+    before = story.report
+    story.see(0.75, at=at(1.0))
+    assert story.report == before
+    assert story.silence(0.125).see().faults == ["ROBOT_NOT_READ"]
+    assert story.see(said_at=51.0).report.at == at(1.0)
+
+
+def test_a_reading_that_is_repeated_shows_no_robot_that_stands() -> None:  # FLEET-SENSING-2 and 3
+    story = driving(7, said_at=50.0).order(Stop(8, of=7)).see(4.5)
+    assert story.memory.command is not None
+    assert story.see(said_at=54.0).memory.command is None
 
 
 def test_a_robots_clock_may_be_set_back() -> None:  # FLEET-SENSING-2

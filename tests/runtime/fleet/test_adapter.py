@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from bridges.kinds.fleet.report import RobotReport
 from bridges.kinds.fleet.signals import Act, LightAnswer, Localize, Navigate, Order, Pose, Stop
 from bridges.kinds.shared.decision import Fault
 from bridges.runtime.fleet import robot as rmf_robot
-from bridges.runtime.fleet.adapter import FleetAdapter, installed
+from bridges.runtime.fleet.adapter import NOT_PASSED, FleetAdapter, installed
 from bridges.settings.fleet_site import FleetSite, read_site
 from bridges.settings.load import load
 from bridges.transports.transport import TransportError
@@ -129,6 +130,23 @@ class TestOnTheStandIn(AdapterContract):
         assert adapter.connect()
         adapter.close()
 
+    def test_a_robot_that_config_yaml_lacks_is_told_with_the_reason(
+        self, stand_in: StandIn, rmf: Joined
+    ) -> None:
+        rmf.says(robot="AMR99")
+        reason = rmf.adapter.failed["AMR99"]
+        assert reason == f"{NOT_PASSED}: add_robot(): incompatible function arguments."
+
+    def test_files_at_which_rmf_throws_are_told_by_name(self, tmp_path: Path) -> None:
+        config = tmp_path / "config.yaml"
+        text = Path(SITE.config_file).read_text()
+        config.write_text(text.replace("{charger: wait_1}", "{charger: {waypoint: wait_1}}"))
+        site = msgspec.structs.replace(SITE, config_file=str(config))
+        rmf = StandIn(patrols=False)
+        adapter = FleetAdapter(rmf, site, None, lambda robot, order: None, itertools.count())
+        with pytest.raises(TransportError, match=r"refuses .*config.yaml or .*: bad conversion"):
+            adapter.connect()
+
     def test_goals_come_on_a_foreign_thread_in_the_robots_coordinates(
         self, stand_in: StandIn, rmf: Joined
     ) -> None:
@@ -216,9 +234,33 @@ class TestOnTheStandIn(AdapterContract):
         rmf.says()
         rmf.says(faults=(Fault("ROBOT_FAULT", "wheel motor too hot"),), fit=False)
         issues = self.handle(stand_in).issues
-        assert issues == {"ROBOT_FAULT": {"detail": "wheel motor too hot"}}
+        assert issues == [("ROBOT_FAULT", {"detail": "wheel motor too hot"})]
         rmf.says()
-        assert issues == {}
+        assert issues == []
+
+    def test_an_issue_has_the_text_of_its_fault_and_two_faults_are_two_issues(
+        self, stand_in: StandIn, rmf: Joined
+    ) -> None:
+        def told(*details: str) -> list[str]:
+            rmf.says(faults=tuple(Fault("CHARGER_REPORTS_ERROR", text) for text in details))
+            return sorted(issue["detail"] for _, issue in self.handle(stand_in).issues)
+
+        rmf.says()
+        assert told("charger_a: hot") == ["charger_a: hot"]
+        assert told("charger_a: no power") == ["charger_a: no power"]
+        both = ["charger_a: no power", "charger_b: hot"]
+        assert told(*both) == both
+        assert told("charger_b: hot") == ["charger_b: hot"]
+
+    def test_an_issue_lasts_while_its_fault_only_counts(
+        self, stand_in: StandIn, rmf: Joined
+    ) -> None:
+        rmf.says()
+        for age_s in (4, 5, 6):
+            text = f"its reported position is {age_s} s old"
+            rmf.says(faults=(Fault("ROBOT_NOT_READ", text),))
+        first = {"detail": "its reported position is 4 s old"}
+        assert self.handle(stand_in).issues == [("ROBOT_NOT_READ", first)]
 
     def test_the_fleets_state_goes_out_while_rmf_is_a_stand_in(
         self, stand_in: StandIn, rmf: Joined

@@ -215,3 +215,8 @@ def test_a_robot_in_the_coordinators_queue_is_explained_by_the_reason_in_the_que
     assert ours.now == (
         "tiny/AMR01 waits in the coordinator's queue, by the robot: charger_a is silent.",
     )
+
+
+def test_nothing_is_said_of_new_tasks_of_a_robot_that_rmf_can_only_pause() -> None:
+    before = explained(reported(10.0, new_tasks="-")).before
+    assert before.endswith("doing nothing, battery 80 %.")
