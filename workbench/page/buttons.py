@@ -83,19 +83,19 @@ class Buttons:
         return actions(shown, self._local(key), self._graph) if shown else ()
 
     def _local(self, key: Key) -> Local | None:
-        served = self._here.served.get(key)
+        served = self._here.serving(key)
         return served.local if served else None
 
     def _of_kind(self, key: Key, request: Request) -> None:
         if key[0] == "charger":
             with ui.element("div").classes("actions"):
                 self._queueing(key[1], request)
-        local = self._local(key)
-        if local and (local.presses or local.fails):
+        served = self._here.serving(key)
+        if served and (served.local.presses or served.local.fails):
             with ui.element("div").classes("actions"):
-                self._pressing(local, self._here.served[key].device, request)
+                self._pressing(served.local, served.device, request)
             with ui.element("div").classes("actions"):
-                self._failing(local, self._here.served[key].device, request)
+                self._failing(served.local, served.device, request)
 
     def _queueing(self, charger: str, request: Request) -> None:
         robot = ui.input("Robot (FLEET/ROBOT)").props("dense")
