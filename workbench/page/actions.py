@@ -34,6 +34,7 @@ WAITS: Final = "--timeout=20"
 MOST_OUTPUT: Final = 16 * 1024
 MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
+MOST_NAMED: Final = 10
 RESET: Final = "The daemon clears each latched fault whose cause is gone."
 REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
 """Pattern of the beginning of an error message, which is the command's name."""
@@ -58,11 +59,14 @@ class Action:
 class Local:
     """A daemon on this machine that serves the device.
 
-    `file` is the daemon's YAML. If the daemon runs a simulation, `presses` has the signals that can be
+    `file` is the daemon's YAML, which has all these `devices`. `alarms` means that the daemon can raise
+    an alarm that stops robots. If the daemon runs a simulation, `presses` has the signals that can be
     pressed, and `fails` has the parts that can fail. Otherwise both are empty.
     """
 
     file: str
+    devices: tuple[str, ...]
+    alarms: bool = False
     presses: tuple[str, ...] = ()
     fails: tuple[str, ...] = ()
     runtime: str = ""
@@ -103,15 +107,24 @@ def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list
     found = [*_on_graph(view, graph)]
     if local is not None:
         words = ("reset", *_runtime(local), "--", local.file)
-        found.append(
-            Action(
-                "Reset faults",
-                "Clear each latched fault whose cause is gone?",
-                words,
-                RESET,
-            )
-        )
+        found.append(Action("Reset faults", _reset_question(local), words, RESET))
     return found
+
+
+def _reset_question(local: Local) -> str:
+    """Return the question before a reset. A reset always concerns the whole daemon."""
+    names = ", ".join(map(printable, local.devices[:MOST_NAMED]))
+    more = len(local.devices) - MOST_NAMED
+    every = f"{names} and {more} more" if more > 0 else names
+    question = (
+        f"Clear each latched fault whose cause is gone, on every device of the daemon: {every}?"
+    )
+    if not local.alarms:
+        return question
+    return (
+        f"{question} This also ends the daemon's alarm for the fleets, if its causes are gone."
+        " Then robots that only this alarm stops drive on."
+    )
 
 
 def _on_graph(view: DeviceView, graph: Sequence[str]) -> list[Action]:

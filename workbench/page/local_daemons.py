@@ -19,6 +19,7 @@ from pathlib import Path
 
 from bridges.runtime.daemons import DaemonStatus, daemons
 from bridges.runtime.diagnostics import CONTACTS
+from bridges.runtime.fleet_alarm import ALARM
 from bridges.system.directories import runtimes
 from workbench.graph.plants import ask
 from workbench.page.actions import Local
@@ -102,6 +103,8 @@ def _devices(
         can = plant.get(name, {})
         local = Local(
             str(daemon.status.get("file", "")),
+            tuple(daemon.devices),
+            ALARM in daemon.status,
             tuple(can.get("press", ())),
             tuple(can.get("fail", ())),
             str(folder),

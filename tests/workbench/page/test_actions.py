@@ -10,7 +10,7 @@ from workbench.page.live_site import DeviceView
 
 GRAPH = ("--domain-id", "7", "--localhost")
 HOSTILE = "--config=/etc/shadow"
-LOCAL = Local("/etc/rmf-bridges/a.yaml", ("robot",), ("unit",), "/run/a")
+LOCAL = Local("/etc/rmf-bridges/a.yaml", ("a", "b"), False, ("robot",), ("unit",), "/run/a")
 
 
 def parsed(action: Action) -> dict[str, object]:
@@ -44,7 +44,18 @@ def test_a_charge_can_be_cancelled_and_queued(name: str) -> None:
 def test_a_daemon_on_this_machine_can_be_reset_and_its_simulation_pressed_and_failed() -> None:
     (reset,) = actions(DeviceView(BoardRow("door", "a", ""), d.DoorState()), LOCAL, GRAPH)
     assert str(parsed(reset)["file"]) == LOCAL.file
+    every = "Clear each latched fault whose cause is gone, on every device of the daemon: a, b?"
+    assert reset.question == every
     pressed = parsed(press(LOCAL, HOSTILE, "robot", on=False))
     assert (pressed["device"], pressed["signal"], pressed["how"]) == (HOSTILE, "robot", "off")
     failed = parsed(fail(LOCAL, HOSTILE, "unit", "stuck"))
     assert (failed["device"], failed["part"]) == (HOSTILE, "unit")
+
+
+def test_a_reset_asks_about_all_devices_of_the_daemon_and_about_robots_that_will_drive() -> None:
+    local = Local("/etc/a.yaml", tuple(f"door{n}" for n in range(12)), alarms=True)
+    (reset,) = actions(DeviceView(BoardRow("door", "a", ""), d.DoorState()), local, GRAPH)
+    assert reset.question.endswith(
+        ", door8, door9 and 2 more? This also ends the daemon's alarm for the fleets, if its causes"
+        " are gone. Then robots that only this alarm stops drive on."
+    )

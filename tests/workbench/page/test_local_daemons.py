@@ -26,7 +26,7 @@ class Machine:
         self.site = LiveSite()
         self.site.take(lift(0.0))
         self._base, self._running = base, running
-        self._here = LocalDaemons(base, self.site.reporters, lambda: 0)
+        self.here = LocalDaemons(base, self.site.reporters, lambda: 0)
 
     def runs(self, name: str, pid: int, domain_id: int = 0, **more: object) -> None:
         """Start a daemon on this machine. `name` is the name of its node and of its directory."""
@@ -42,8 +42,8 @@ class Machine:
 
     def file(self, key: tuple[str, str] = LIFT1) -> str:
         """Return the YAML that the page's buttons for this device would name."""
-        self._here.look()
-        served = self._here.serving(key)
+        self.here.look()
+        served = self.here.serving(key)
         return served.local.file if served else ""
 
 
@@ -76,6 +76,16 @@ def test_of_two_daemons_with_one_name_the_one_that_reports_serves_the_device(
     assert machine.file() == "/etc/lift_a.yaml"
     machine.reports("practice", pid=8)
     assert machine.file() == ""
+
+
+def test_a_reset_tells_of_every_device_of_the_file_and_of_its_alarm(machine: Machine) -> None:
+    machine.runs(
+        "lift_a", pid=7, devices={"Lift1": {}, "Lift2": {}}, alarm={"alarm state": "clear"}
+    )
+    machine.here.look()
+    served = machine.here.serving(LIFT1)
+    assert served is not None
+    assert (served.local.devices, served.local.alarms) == (("Lift1", "Lift2"), True)
 
 
 def test_of_two_directories_with_one_name_the_daemons_own_is_named(
