@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from bridges.kinds.charger_coordinator.memory import NODE
 from bridges.messages import definitions as d
 from bridges.messages.words import printable
 from bridges.system.log import pairs
@@ -35,6 +36,10 @@ MOST_OUTPUT: Final = 16 * 1024
 MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
 MOST_NAMED: Final = 10
+AGAIN: Final = (
+    "But the charger coordinator requests a charge again, within seconds, as long as the robot needs"
+    " one. To stop this, give the robot a task in RMF, or stop the coordinator."
+)
 RESET: Final = "The daemon clears each latched fault whose cause is gone."
 REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
 """Pattern of the beginning of an error message, which is the command's name."""
@@ -139,11 +144,14 @@ def _on_graph(view: DeviceView, graph: Sequence[str]) -> list[Action]:
                 )
             ]
         case d.ChargerState(charger_name=name, request_id=request) if request:
+            ours = request.startswith(f"{NODE}/")
+            question = f"Cancel request {printable(request)}? The robot has to leave the pad."
             return [
                 Action(
                     "Cancel the charge",
-                    f"Cancel request {printable(request)}? The robot has to leave the pad.",
+                    f"{question} {AGAIN}" if ours else question,
                     ("send", "charger", f"--cancel={request}", WAITS, *graph, "--", name),
+                    f"The charger no longer serves the request. {AGAIN}" if ours else "",
                 )
             ]
         case _:

@@ -5,7 +5,7 @@ import pytest
 from bridges.cli import whole_parser
 from bridges.messages import definitions as d
 from workbench.graph.board import BoardRow
-from workbench.page.actions import Action, Local, actions, fail, press, queue
+from workbench.page.actions import AGAIN, Action, Local, PastAction, actions, fail, press, queue
 from workbench.page.live_site import DeviceView
 
 GRAPH = ("--domain-id", "7", "--localhost")
@@ -39,6 +39,17 @@ def test_a_charge_can_be_cancelled_and_queued(name: str) -> None:
     assert (found["command"], found["name"], found["cancel"]) == ("send", name, name)
     found = parsed(queue(name, HOSTILE, GRAPH))
     assert (found["name"], found["robot"], found["queue"]) == (name, HOSTILE, True)
+
+
+def test_before_and_after_a_cancel_the_coordinators_next_request_is_foretold() -> None:
+    told = []
+    for request in ("send-1", "charger_coordinator/tiny/R1/1"):
+        state = d.ChargerState(charger_name="pad", request_id=request)
+        (action,) = actions(DeviceView(BoardRow("charger", "pad", ""), state), None, GRAPH)
+        said = "1 s  done     pad  pad no longer serves request x"
+        past = PastAction(0.0, "ann", action.text, 0, said, action.done)
+        told.append([AGAIN in action.question, AGAIN in past.came])
+    assert told == [[False, False], [True, True]]
 
 
 def test_a_daemon_on_this_machine_can_be_reset_and_its_simulation_pressed_and_failed() -> None:
