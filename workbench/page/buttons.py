@@ -21,6 +21,7 @@ from workbench.page.tables import table
 SHOWN_MS: Final = 10_000
 LONGEST: Final = 400
 MOST_TOLD: Final = 10
+ENDED: Final = "You are no longer logged in: nothing was done. This view loads again in a moment."
 NO: Final = "No, change nothing"
 
 
@@ -143,7 +144,8 @@ class Buttons:
             return
         user = self._login.user(request)
         if not user:
-            ui.notify("You are no longer logged in: nothing was done.", type="warning")
+            ui.notify(ENDED, type="warning", timeout=SHOWN_MS)
+            ui.run_javascript(f"setTimeout(() => location.reload(), {SHOWN_MS})")
             return
         done = await self._deeds.do(action, user)
         kind: Literal["positive", "negative"] = "positive" if done.code == 0 else "negative"
