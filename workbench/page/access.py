@@ -145,6 +145,13 @@ class LoginSession:
     used_at: float
     proof: str
 
+    def use(self, now: float) -> bool:
+        """Note a use of the session. Return False if the session is over."""
+        if now - self.began_at > SESSION_S or now - self.used_at > IDLE_S:
+            return False
+        self.used_at = now
+        return True
+
 
 class LoginSessions:
     """Logins by cookie secret."""
@@ -165,11 +172,10 @@ class LoginSessions:
         session = self._by_secret.get(secret or "")
         if session is None or secret is None:
             return None
-        if now - session.began_at > SESSION_S or now - session.used_at > IDLE_S:
-            del self._by_secret[secret]
-            return None
-        session.used_at = now
-        return session
+        if session.use(now):
+            return session
+        del self._by_secret[secret]
+        return None
 
     def end(self, secret: str | None) -> None:
         """End the session that has this secret."""

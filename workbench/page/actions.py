@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from bridges.kinds.charger_coordinator.memory import NODE
 from bridges.messages import definitions as d
 from bridges.messages.words import printable
 from bridges.system.log import pairs
@@ -34,6 +35,11 @@ WAITS: Final = "--timeout=20"
 MOST_OUTPUT: Final = 16 * 1024
 MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
+MOST_NAMED: Final = 10
+AGAIN: Final = (
+    "But the charger coordinator requests a charge again, within seconds, as long as the robot needs"
+    " one. To stop this, give the robot a task in RMF, or stop the coordinator."
+)
 RESET: Final = "The daemon clears each latched fault whose cause is gone."
 REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
 """Pattern of the beginning of an error message, which is the command's name."""
@@ -58,11 +64,14 @@ class Action:
 class Local:
     """A daemon on this machine that serves the device.
 
-    `file` is the daemon's YAML. If the daemon runs a simulation, `presses` has the signals that can be
+    `file` is the daemon's YAML, which has all these `devices`. `alarms` means that the daemon can raise
+    an alarm that stops robots. If the daemon runs a simulation, `presses` has the signals that can be
     pressed, and `fails` has the parts that can fail. Otherwise both are empty.
     """
 
     file: str
+    devices: tuple[str, ...]
+    alarms: bool = False
     presses: tuple[str, ...] = ()
     fails: tuple[str, ...] = ()
     runtime: str = ""
@@ -103,15 +112,24 @@ def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list
     found = [*_on_graph(view, graph)]
     if local is not None:
         words = ("reset", *_runtime(local), "--", local.file)
-        found.append(
-            Action(
-                "Reset faults",
-                "Clear each latched fault whose cause is gone?",
-                words,
-                RESET,
-            )
-        )
+        found.append(Action("Reset faults", _reset_question(local), words, RESET))
     return found
+
+
+def _reset_question(local: Local) -> str:
+    """Return the question before a reset. A reset always concerns the whole daemon."""
+    names = ", ".join(map(printable, local.devices[:MOST_NAMED]))
+    more = len(local.devices) - MOST_NAMED
+    every = f"{names} and {more} more" if more > 0 else names
+    question = (
+        f"Clear each latched fault whose cause is gone, on every device of the daemon: {every}?"
+    )
+    if not local.alarms:
+        return question
+    return (
+        f"{question} This also ends the daemon's alarm for the fleets, if its causes are gone."
+        " Then robots that only this alarm stops drive on."
+    )
 
 
 def _on_graph(view: DeviceView, graph: Sequence[str]) -> list[Action]:
@@ -126,11 +144,14 @@ def _on_graph(view: DeviceView, graph: Sequence[str]) -> list[Action]:
                 )
             ]
         case d.ChargerState(charger_name=name, request_id=request) if request:
+            ours = request.startswith(f"{NODE}/")
+            question = f"Cancel request {printable(request)}? The robot has to leave the pad."
             return [
                 Action(
                     "Cancel the charge",
-                    f"Cancel request {printable(request)}? The robot has to leave the pad.",
+                    f"{question} {AGAIN}" if ours else question,
                     ("send", "charger", f"--cancel={request}", WAITS, *graph, "--", name),
+                    f"The charger no longer serves the request. {AGAIN}" if ours else "",
                 )
             ]
         case _:

@@ -21,6 +21,7 @@ from workbench.page.tables import table
 SHOWN_MS: Final = 10_000
 LONGEST: Final = 400
 MOST_TOLD: Final = 10
+ENDED: Final = "You are no longer logged in: nothing was done. This view loads again in a moment."
 NO: Final = "No, change nothing"
 
 
@@ -83,19 +84,19 @@ class Buttons:
         return actions(shown, self._local(key), self._graph) if shown else ()
 
     def _local(self, key: Key) -> Local | None:
-        served = self._here.served.get(key)
+        served = self._here.serving(key)
         return served.local if served else None
 
     def _of_kind(self, key: Key, request: Request) -> None:
         if key[0] == "charger":
             with ui.element("div").classes("actions"):
                 self._queueing(key[1], request)
-        local = self._local(key)
-        if local and (local.presses or local.fails):
+        served = self._here.serving(key)
+        if served and (served.local.presses or served.local.fails):
             with ui.element("div").classes("actions"):
-                self._pressing(local, self._here.served[key].device, request)
+                self._pressing(served.local, served.device, request)
             with ui.element("div").classes("actions"):
-                self._failing(local, self._here.served[key].device, request)
+                self._failing(served.local, served.device, request)
 
     def _queueing(self, charger: str, request: Request) -> None:
         robot = ui.input("Robot (FLEET/ROBOT)").props("dense")
@@ -143,7 +144,8 @@ class Buttons:
             return
         user = self._login.user(request)
         if not user:
-            ui.notify("You are no longer logged in: nothing was done.", type="warning")
+            ui.notify(ENDED, type="warning", timeout=SHOWN_MS)
+            ui.run_javascript(f"setTimeout(() => location.reload(), {SHOWN_MS})")
             return
         done = await self._deeds.do(action, user)
         kind: Literal["positive", "negative"] = "positive" if done.code == 0 else "negative"

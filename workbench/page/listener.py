@@ -40,6 +40,7 @@ class Listener:
         self._thread = threading.Thread(target=self._listen, name="graph", daemon=True)
         self.lost = 0
         self.cut = 0
+        self.domain_id: int | None = None
         self.trouble = "has not joined RMF's graph yet"
 
     def start(self) -> None:
@@ -76,7 +77,7 @@ class Listener:
             try:
                 with closing(self._join()) as transport:
                     subscribed(transport, HEARD, partial(self._receive, transport.sender))
-                    self.trouble = ""
+                    self.domain_id, self.trouble = transport.domain_id, ""
                     self._stay(transport)
             except TransportError as error:
                 if not self.trouble.endswith(str(error)):

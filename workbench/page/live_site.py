@@ -8,7 +8,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import tzinfo
-from typing import Final
+from typing import Final, NamedTuple
 
 from msgspec.structs import replace
 
@@ -23,6 +23,7 @@ from bridges.observe.charger import NOBODY, ObservedCharger
 from bridges.observe.diagnosis import FLEET, PANEL, about, kind_in
 from bridges.observe.limits import FORGOTTEN_S
 from bridges.observe.requesters import Moment
+from bridges.observe.robots import robots
 from bridges.runtime.diagnostics import MOST
 from workbench.explain import heard_devices
 from workbench.explain.answer import Remedies
@@ -82,6 +83,13 @@ class DeviceView:
     stands: Stands | None = None
     heard_wall: float = 0.0
     read_wall: float = 0.0
+
+
+class Running(NamedTuple):
+    """A daemon's process: the name of its node, and its process id, as the daemon reports both."""
+
+    node: str
+    pid: str
 
 
 class LiveSite:
@@ -161,6 +169,15 @@ class LiveSite:
     def alarms(self) -> list[ObservedAlarm]:
         """Return the alarms of all nodes."""
         return self._story.alarms()
+
+    def reporters(self, kind: str, name: str) -> set[Running]:
+        """Return the daemons that report on a device or robot on the graph. `name` is printable."""
+        device = self._found(kind, name)
+        said = [one for one in device.said if one.kind == kind] if device else []
+        if kind == "robot":
+            said = [one.said for one in robots(self._story.nodes) if one.who == name]
+        daemons = filter(None, map(self._story.daemon_of, said))
+        return {Running(one.subject[1], pid) for one in daemons if (pid := one.value("pid"))}
 
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
         """Return the last ten minutes of a device. `name` is the device's printable name.

@@ -3,7 +3,8 @@ header of a trusted proxy.
 
 A session's cookie is HttpOnly and SameSite=Strict. If the form came over TLS, the cookie is also
 Secure. Besides the cookie, each form contains a secret value (`proof`), against forged forms. The
-header of a reverse proxy counts only if the request comes from the proxy's address.
+header of a reverse proxy counts only if the request comes from the proxy's address. A tab keeps the
+request that loaded it. So a proxy's header counts only as long as a session would.
 """
 
 import asyncio
@@ -18,9 +19,11 @@ from fastapi.requests import HTTPConnection
 from fastapi.responses import HTMLResponse, RedirectResponse
 
 from bridges.messages.words import printable
-from workbench.page.access import LoginSessions, PasswordCheck
+from workbench.page.access import LoginSession, LoginSessions, PasswordCheck
 
 COOKIE: Final = "rmf_bridge_page"
+PROXIED: Final = "rmf_bridge_page"
+"""Key in the scope of a proxy's request, for the session that began with the request."""
 STYLE: Final = (Path(__file__).parent / "style.css").read_text(encoding="utf-8")
 SCRIPT: Final = (Path(__file__).parent / "page.js").read_text(encoding="utf-8")
 FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
@@ -47,10 +50,13 @@ class Login:
         self._one_at_a_time = asyncio.Lock()
 
     def user(self, request: HTTPConnection) -> str:
-        """Return the user. Return "" without a login."""
+        """Return the user. Return "" without a login, or after the login's end."""
+        now = time.monotonic()
         if self._proxy and request.client and request.client.host == self._proxy:
-            return printable(request.headers.get(self._header, ""))[:64]
-        session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
+            user = printable(request.headers.get(self._header, ""))[:64]
+            began = request.scope.setdefault(PROXIED, LoginSession(user, now, now, ""))
+            return user if began.use(now) else ""
+        session = self._sessions.find(request.cookies.get(COOKIE), now)
         return session.user if session else ""
 
     def form(self, request: Request, user: str) -> str:

@@ -49,8 +49,9 @@ FILTERS: Final = (
     '<label><input id="only" type="checkbox"> Only what needs attention</label></div>'
 )
 NOT_HERE: Final = (
-    "The device's daemon is not on this machine, or the page's user may not see the daemon. To see"
-    " wiring, limits and live levels, open a page on the daemon's own machine."
+    "The device's daemon is not on this machine, or the page's user may not see the daemon. Or two"
+    " daemons here have a device of this name. To see wiring, limits and live levels, open a page on"
+    " the daemon's own machine."
 )
 
 
@@ -220,11 +221,11 @@ class SiteViews:
         return svg(found, zone=zone) if found else ""
 
     def _levels(self, key: Key) -> str:
-        served = self._here.served.get(key)
+        served = self._here.serving(key)
         return tables.levels(served.sensed, served.driven) if served else ""
 
     def _wiring(self, key: Key) -> str:
-        served = self._here.served.get(key)
+        served = self._here.serving(key)
         if served is None or not served.local.file:
             return f"<p>{NOT_HERE}</p>"
         return tables.wiring(served.local.file, served.device, served.contacts)

@@ -158,7 +158,8 @@ def _live(
 ) -> Listener:
     site = LiveSite(graph)
     listener = Listener(site, join)
-    cards, here = Cards(site, listener), LocalDaemons(args.runtime_dirs)
+    cards = Cards(site, listener)
+    here = LocalDaemons(args.runtime_dirs, site.reporters, lambda: listener.domain_id)
     state = os.environ.get("STATE_DIRECTORY")
     deeds = Deeds(Path(state) if state else None)
     SiteViews(site, cards, here, login, deeds, graph).install()

@@ -502,6 +502,29 @@ def test_a_request_for_any_charger_is_done_when_one_of_them_shows_the_robot() ->
     assert ran.outcome == Fulfilled("b is assigned for fleet/robot")
 
 
+OURS = replace(CHARGER, charger_name="b", request_id="x", robot_fleet="fleet", robot_name="robot")
+
+
+def test_a_charger_that_has_released_the_robot_from_its_last_charge_does_not_serve_it() -> None:
+    ran = tell(QUEUE, every_second(replace(OURS, state=4), until=4.0), timeout_s=5.0)
+    assert ran.outcome == Failed("gave up after 5 s")
+    assert ran.hints[0].startswith("no charger serves fleet/robot yet: the robot waits in the")
+    given = replace(OURS, charger_name="c", state=2)
+    both = [(0.5, replace(OURS, state=4)), (1.2, given), (1.2, replace(OURS, state=4))]
+    assert tell(QUEUE, both).outcome == Fulfilled("c is assigned for fleet/robot")
+
+
+@pytest.mark.parametrize("state", [2, 3, 4])
+def test_a_refusal_counts_although_a_charger_still_shows_the_robots_earlier_charge(
+    state: int,
+) -> None:
+    unsuited = msgspec.structs.replace(REFUSAL, reason="station does not suit the robot")
+    states = [(0.5, replace(OURS, state=state)), (0.6, replace(OURS, state=state))]
+    ran = tell(QUEUE, [*states, (0.6, unsuited.message())])
+    assert isinstance(ran.outcome, Failed)
+    assert "station does not suit the robot" in ran.outcome.text
+
+
 def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
     waits = tell(QUEUE, every_second(OTHERS), timeout_s=5.0)
     text = (

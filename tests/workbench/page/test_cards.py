@@ -5,11 +5,14 @@ import json
 
 from msgspec.structs import replace
 
+from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
+from bridges.runtime.diagnostics import diagnosis
 from bridges.transports.transport import Transport, TransportError
-from tests.workbench.page.test_live_site import LIFT, WALL, lift
+from tests.workbench.page.test_live_site import LIFT, WALL, heard, lift
 from workbench.page.cards import Cards, place_of, script
+from workbench.page.drawing import SILENT_DO
 from workbench.page.listener import Listener
 from workbench.page.live_site import LiveSite
 
@@ -66,6 +69,25 @@ def test_all_changes_of_a_turn_are_one_script_for_every_browser() -> None:
         ]
     )
     assert [wall.wrong for wall in walls] == [0, 0]
+
+
+def test_a_panel_and_a_coordinator_that_fell_silent_stay_and_need_attention() -> None:
+    site, now = LiveSite(), [1.0]
+    listener = Listener(site, nowhere)
+    cards = Cards(site, listener, lambda: now[0])
+    for kind, name in (("alarm", "Main panel"), ("charger_coordinator", "site")):
+        status = {name: {"faults": [], "input_age_s": 0.1, "state": "quiet"}}
+        told = diagnosis(f"{kind}_a", kind, {}, status, stamp(WALL))
+        listener.hear(heard(1.0, topics.DIAGNOSTICS, told))
+    keys = [("alarm", "Main panel"), ("coordinator", "charger_coordinator_a")]
+    cards.turn()
+    assert (sorted(cards.cards), cards.wrong, cards.attention()) == (keys, 0, "")
+    now[0] = 9.0
+    cards.turn()
+    assert (sorted(cards.cards), cards.wrong) == (keys, 2)
+    assert ["◷ OLD: silent" in cards.cards[key] for key in keys] == [True, True]
+    assert "2 need attention" in cards.status()
+    assert cards.attention().count("✖ OLD: silent") == cards.attention().count(SILENT_DO) == 2
 
 
 def test_a_script_has_every_text_as_data_in_plain_ascii() -> None:

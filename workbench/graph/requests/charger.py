@@ -134,9 +134,12 @@ class QueuedCharge(RobotCharge):
         return f"{self.fleet}/{self.robot}"
 
     def about(self, state: words.Stated) -> bool:
-        """Return whether the state is from a charger that serves this robot."""
-        return isinstance(state, d.ChargerState) and (
-            (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
+        """Return whether the state is from a charger that serves this robot. A charger that is RELEASED
+        served the robot before this request."""
+        return (
+            isinstance(state, d.ChargerState)
+            and (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
+            and state.state != d.ChargerStateValue.CHARGER_RELEASED
         )
 
     def ready(self, seen: RequestProgress) -> bool:
@@ -144,11 +147,13 @@ class QueuedCharge(RobotCharge):
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled after a charger serves the robot. Return Failed if the coordinator
-        refuses."""
+        """Return Fulfilled after a charger serves the robot. Return Failed if the coordinator refuses,
+        even if a charger still serves an earlier request of the robot."""
+        if refused := self._refused(seen):
+            return refused
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING:
-            return self._refused(seen)
+            return None
         state = words.plain(d.ChargerStateValue, answer.state)
         return Fulfilled(f"{answer.charger_name} is {state} for {self.who}")
 

@@ -151,6 +151,7 @@ def test_a_session_that_has_ended_can_do_nothing(
     confirm(tab, "Let it fail", until)
     tab.get_by_text("nothing was done").wait_for()
     assert len(deeds(folder)) == before
+    until(lambda: tab.get_by_role("link", name="Log in").count() == 1, "the view loaded again")
 
 
 def test_settings_at_their_defaults_are_folded_and_no_column_is_beyond_the_edge(
