@@ -11,6 +11,8 @@ COORDINATOR-STATIONS-1. A station's state shows that a request has ended.
      has forgotten the request. The wish stays, and the request is sent again (`_forgot`). The restart
      may have switched the power off. Therefore a charge that ends within PROVEN_S of the restart counts
      as cut short.
+   - If a request is over before its station shows it, the station may still take it. The station is not
+     free until it has shown and released the request, or has not shown it within TAKEN_S.
 COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
    place in the queue. If the robot is at fault, or the side at fault is unclear, the error also counts
    as a failure of the robot. After a second failure the robot is not tried again, and the coordinator
@@ -71,7 +73,7 @@ def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLi
         return memory
     if state.state is not IDLE and state.request_id == grant.request_id:
         return _followed(memory, name, grant, seen, now, site)
-    if grant.over:
+    if grant.over and (grant.shown or grant.started or now >= not_taken_at(grant)):
         return memory.with_grant(name, None)
     if grant.shown and seen.diagnosis is FaultCause.LOST:
         return memory
