@@ -24,8 +24,9 @@ COORDINATOR-STATIONS-3. A failure of a robot is forgotten when the robot has bee
    has left.
 COORDINATOR-STATIONS-4. If another robot is on the pad, the assigned robot keeps the station for its
    start_timeout. If a station is out of reach, its error does not show whether the charge goes on. If a
-   robot was charging at that station, the robot keeps the station. If the robot is still on its way, it
-   gets another station after LOST_S.
+   robot was charging at that station, the robot keeps the station. It loses the station after LOST_S if
+   its fleet then sees it elsewhere, for PROVEN_S. If the robot is still on its way, it gets another
+   station after LOST_S.
 """
 
 from typing import Final
@@ -189,9 +190,11 @@ def _waits_at(memory: SiteMemory, station: str, site: SiteLimits) -> RobotName |
 def in_time(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Apply timeouts."""
     for name, grant in list(memory.grants.items()):
-        if grant.over or grant.started:
+        if grant.over or (grant.started and not left_lost(memory, name, grant, site)):
             continue
-        if memory.may_speak and not grant.shown and now >= not_taken_at(grant):
+        if grant.started:
+            memory = memory.takes_back(grant.robot)
+        elif memory.may_speak and not grant.shown and now >= not_taken_at(grant):
             shunned = {**memory.shunned, name: now + SHUNNED_S}
             memory = replace(memory, shunned=shunned).with_grant(name, None)
             memory = memory.last_in_queue(grant.robot)
@@ -220,6 +223,15 @@ def hopeless_at(memory: SiteMemory, name: str, grant: Grant) -> float:
     if seen is not None and seen.diagnosis is FaultCause.PAD:
         at = min(at, seen.since + max(grant.start_timeout_s, LOST_S))
     return at
+
+
+def left_lost(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> bool:
+    """Return whether the fleet sees a robot away from the station that charged it, although the station
+    cannot show that the charge has ended."""
+    standing = memory.robots.get(grant.robot)
+    if standing is None or memory.stands_at(grant.robot, site) == name:
+        return False
+    return standing.at >= max(hopeless_at(memory, name, grant), standing.here_since + PROVEN_S)
 
 
 def absent_at(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> float:

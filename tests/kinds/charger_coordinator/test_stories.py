@@ -448,6 +448,20 @@ def test_a_charge_goes_on_at_an_unreachable_station() -> None:
     assert site.run(70.0) == [(60.25, "charger_a: CHARGING AMR01")]
 
 
+def test_a_robot_that_has_left_a_dead_charger_for_a_task_is_charged_at_another() -> None:
+    site = charges_at_a(by_operator=True, knows=True)
+    site.chargers["charger_a"].dead = True
+    site.fleet.works("AMR01", "ward", site.now)
+    site.run(300.0)
+    site.fleet.charge("AMR01", site.now, 20.0)
+    assert site.run(330.0) == [
+        (306.25, "charger_b <- charge AMR01"),
+        (306.25, "charger_b: ASSIGNED AMR01"),
+        (306.25, "AMR01 -> CHARGE dock_b"),
+        (312.25, "charger_b: CHARGING AMR01"),
+    ]
+
+
 def test_a_robot_on_its_way_to_a_station_that_falls_silent_is_sent_to_another() -> None:
     site = yard(drive_s=50.0)
     site.fleet.charge("AMR01", site.now)
