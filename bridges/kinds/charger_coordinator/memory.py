@@ -189,6 +189,11 @@ class StationSeen(msgspec.Struct, frozen=True):
         """The side at fault; NONE without an error."""
         return diagnosis(self.error) if self.state is ERROR else FaultCause.NONE
 
+    @property
+    def out_of_service(self) -> bool:
+        """Return whether the error is, or may be, the station's own."""
+        return self.diagnosis in (FaultCause.STATION, FaultCause.LOST, FaultCause.UNCLEAR)
+
 
 class Nudge(msgspec.Struct, frozen=True):
     """The orders that told a robot to leave a pad.

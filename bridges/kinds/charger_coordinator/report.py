@@ -155,7 +155,7 @@ def _faults_of(
     memory: SiteMemory, name: str, seen: StationSeen, now: float, site: SiteLimits
 ) -> Iterator[Fault]:
     """Yield the faults in a station's state."""
-    if seen.diagnosis in (FaultCause.STATION, FaultCause.LOST, FaultCause.UNCLEAR):
+    if seen.out_of_service:
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
     if seen.diagnosis is not FaultCause.PAD:
         return

@@ -16,8 +16,8 @@ COORDINATOR-STATIONS-1. A station's state shows that a request has ended.
 COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
    place in the queue. If the robot is at fault, or the side at fault is unclear, the error also counts
    as a failure of the robot. After a second failure the robot is not tried again, and the coordinator
-   alerts a technician. If two stations suit the robot, the first failure is at one of them and the
-   second at the other.
+   alerts a technician. If two stations suit the robot and are in order, the first failure is at one of
+   them and the second at the other.
 COORDINATOR-STATIONS-3. A failure of a robot is forgotten when the robot has been charged for PROVEN_S,
    or fully. The failure is also forgotten when the station proves to be at fault. One proof is an error
    that names the station. The other proof is an error that lasts for more than PROVEN_S after the robot
