@@ -97,7 +97,7 @@ WHOSE: Final[Mapping[By, str]] = {
 class Wish(msgspec.Struct, frozen=True):
     """One robot's need to be charged.
 
-    `by`: the origin of the wish (the fleet's state, the schedule, an operator). `task_id`: the robot's
+    `by`: the origin of the wish (the fleet's state, our schedule, an operator). `task_id`: the robot's
     task; empty for an operator's wish. `called`: the task `task_id` is the robot's drive to the
     station, because it began after the station was assigned to the robot. `station`, `request_id`,
     `start_timeout_s`: from the operator's request.

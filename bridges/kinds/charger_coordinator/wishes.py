@@ -200,7 +200,7 @@ def _asks(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits) 
         return None
     low = s.battery_percent < site.again_percent
     if s.charges and (low or _believed(memory, standing, now)):
-        return "schedule" if s.who in memory.preferred and not memory.alone else "fleet"
+        return "fleet"
     if s.charges or now < memory.absent.get(s.who, now):
         return None
     aim = schedule.target(site.schedule, s.who, memory.when)

@@ -320,9 +320,7 @@ def test_the_memory_has_the_time_since_a_robot_has_stood_and_done_the_same(
         (seen(percent=94.9), {"when": AT_NIGHT, "rested": frozenset({ONE})}, None),
         (seen(percent=94.9), {"when": AT_NIGHT, "rested": frozenset({TWO})}, "schedule"),
         (seen(percent=80.0), {"when": AT_NIGHT, "rested": frozenset({ONE})}, "fleet"),
-        (seen(percent=9.0, charges=True), {"preferred": {ONE: A}, "alone": False}, "schedule"),
-        (seen(percent=9.0, charges=True), {"preferred": {TWO: A}, "alone": False}, "fleet"),
-        (seen(percent=9.0, charges=True), {"preferred": {ONE: A}}, "fleet"),
+        (seen(percent=9.0, charges=True), {"preferred": {ONE: A}, "alone": False}, "fleet"),
     ],
 )
 def test_battery_task_and_schedule_decide_whether_a_standing_robot_has_a_wish(
