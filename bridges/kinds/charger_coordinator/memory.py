@@ -220,7 +220,8 @@ class SiteMemory(msgspec.Struct, frozen=True):
     - `rested`: the robots that are already full enough for the entry of the schedule that applies now.
     - `absent`: a robot that did not drive to its assigned station -> the time when it may get a station
       again.
-    - `shunned`: a station that took no request -> the time until which the station is not used.
+    - `shunned`: a station that took no request, and has shown none since -> the time until which the
+      station is not used.
     - `preferred`: the station that another node has dedicated to each robot.
     - `nudges`: the orders to robots to leave a pad.
 

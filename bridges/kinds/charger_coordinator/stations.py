@@ -114,7 +114,7 @@ def _followed(
 ) -> SiteMemory:
     """Follow a station that shows our request."""
     grant = replace(grant, shown=True, started=grant.started or seen.state is CHARGING)
-    memory = memory.with_grant(name, grant)
+    memory = replace(memory, shunned=without(memory.shunned, name)).with_grant(name, grant)
     if grant.over:
         return memory
     if seen.state is RELEASED:

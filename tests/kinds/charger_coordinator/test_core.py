@@ -37,6 +37,13 @@ from tests.kinds.charger_coordinator.virtual_site import RECEIVERS
 SERVED = [CHARGING, RELEASED]
 
 
+class Alerted(Alone):
+    """The core alone. `sent` has the alerts only."""
+
+    def words(self, message: d.Message) -> str:
+        return message.message if isinstance(message, d.Alert) else ""
+
+
 # ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2: which robots want to be charged
 
 
@@ -214,7 +221,17 @@ def test_a_station_that_accepts_no_request_is_passed_over_and_its_robot_is_queue
     assert site_.faults == ["REQUEST_NOT_TAKEN: charger_a: its daemon's log says why"]
     assert site_.run(29) == []
     assert site_.run(1) == [(41.0, "charger_a: AMR02")]
+    site_.does(A, ASSIGNED)
+    site_.run(1)
     assert site_.faults == []
+
+
+def test_a_station_that_takes_no_request_for_an_hour_causes_one_alert() -> None:
+    site_ = Alerted()
+    site_.shows[B] = busy(B)
+    site_.wants(ONE)
+    site_.run(3600)
+    assert site_.sent == [(11.0, "charger_a: its daemon's log says why")]
 
 
 @pytest.mark.parametrize(
