@@ -217,7 +217,8 @@ class SiteMemory(msgspec.Struct, frozen=True):
       refused.
     - `strikes`: the stations where each robot has failed. `served`: the task in which each robot was
       charged.
-    - `rested`: the robots that are already full enough for the entry of the schedule that applies now.
+    - `reached`: the percentage of the schedule that a robot has reached in the present time of the
+      schedule. The robot is charged again only for a higher percentage.
     - `absent`: a robot that did not drive to its assigned station -> the time when it may get a station
       again.
     - `shunned`: a station that took no request, and has shown none since -> the time until which the
@@ -243,7 +244,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
     grants: Mapping[str, Grant] = msgspec.field(default_factory=dict)
     strikes: Mapping[RobotName, tuple[str, ...]] = msgspec.field(default_factory=dict)
     served: Mapping[RobotName, str] = msgspec.field(default_factory=dict)
-    rested: frozenset[RobotName] = frozenset()
+    reached: Mapping[RobotName, float] = msgspec.field(default_factory=dict)
     absent: Mapping[RobotName, float] = msgspec.field(default_factory=dict)
     over: tuple[str, ...] = ()
     count: int = 0
@@ -342,6 +343,11 @@ class SiteMemory(msgspec.Struct, frozen=True):
             return self
         over = (*self.over, wish.request_id)[-8:] if wish.request_id else self.over
         return replace(self, wishes=tuple(w for w in self.wishes if w is not wish), over=over)
+
+    def with_reached(self, robot: RobotName, aim: float) -> "SiteMemory":
+        """Return the memory in which this robot has reached the schedule's percentage `aim`."""
+        most = max(aim, self.reached.get(robot, 0.0))
+        return replace(self, reached={**self.reached, robot: most})
 
     def last_in_queue(self, robot: RobotName) -> "SiteMemory":
         """Return the memory with this robot's wish at the end of the queue."""
