@@ -27,6 +27,7 @@ from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
 ENDED = {
+    "charger_coordinator.memory.Memory.rested",
     "lift.memory.Memory.alarmed",
     "lift.memory.Session.own_stamp",
     "lift.signals.FromAdapter.stamp",

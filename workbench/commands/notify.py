@@ -226,6 +226,7 @@ class Desk:
         self._remedies = faults.for_explain()
         self._machine = Machine(settings.certificates)
         self._kept = b""
+        self._not_kept = False
         with suppress(OSError, msgspec.MsgspecError):
             self._kept = files.read(state / TOLD, 1 << 22)
             kept = msgspec.json.decode(self._kept, type=Kept)
@@ -261,12 +262,13 @@ class Desk:
             with suppress(OSError):
                 key = files.read(path, 4096).decode(errors="replace")
                 known = self._notices.acknowledge(key)
-                logger.info(pairs("acknowledged", trouble=key, known=known))
-                self.keep()
-                path.unlink()  # only now, because SIGTERM may come in between
+                if self.keep():
+                    logger.info(pairs("acknowledged", trouble=key, known=known))
+                    path.unlink()  # only now, because SIGTERM may come in between
 
-    def keep(self) -> None:
-        """Store what has changed."""
+    def keep(self) -> bool:
+        """Store what has changed. Return False if the disk does not take it; the next call then tries
+        again."""
         told = self._notices.kept(_ahead_s())
         waiting = {name: courier.waiting for name, courier in self._couriers.items()}
         kept = msgspec.json.encode(Kept(told, waiting))
@@ -274,8 +276,12 @@ class Desk:
             try:
                 files.replace(self._state / TOLD, kept)
             except OSError as error:
-                logger.error(pairs("not_kept", file=self._state / TOLD, reason=error))
-            self._kept = kept
+                if not self._not_kept:
+                    logger.error(pairs("not_kept", file=self._state / TOLD, reason=error))
+                self._not_kept = True
+                return False
+            self._kept, self._not_kept = kept, False
+        return True
 
 
 def _ahead_s() -> float:

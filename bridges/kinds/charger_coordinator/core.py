@@ -60,7 +60,7 @@ def decide(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> De
     memory, refused = _take(memory, event, now, site)
     memory = stations.in_time(stations.adopted(memory, now, site), now, site)
     if memory.may_speak:
-        memory = allot(_as_dedicated(memory, site), now, site)
+        memory = allot(_as_dedicated(memory, now, site), now, site)
     memory = wrong_pad.nudged(memory, now, site)
     shown = report.report(memory, now, site)
     memory, publish = report.messages(memory, shown.faults, now, site)
@@ -103,7 +103,7 @@ def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMe
     return replace(memory, may_speak=yes, alone=alone, grants=grants, assigned=(), nudges={})
 
 
-def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
+def _as_dedicated(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Take a station back from a robot on its way if another node's schedule has dedicated another
     station to the robot. The reason is that RMF drives the robot only to the dedicated station."""
     if memory.alone:
@@ -111,7 +111,7 @@ def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
     for name, grant in memory.grants.items():
         wish = memory.wish(grant.robot)
         on_its_way = wish is not None and not grant.over and not grant.started
-        if wish is not None and on_its_way and name not in suiting(memory, wish, site):
+        if wish is not None and on_its_way and name not in suiting(memory, wish, now, site):
             memory = memory.takes_back(grant.robot)
     return memory
 

@@ -1,5 +1,5 @@
-"""The part of the memory that is saved to disk for a restart: the queue, each station's robot, and the
-robots' failures.
+"""The part of the memory that is saved to disk for a restart: the queue, each station's robot, the
+robots' failures, and the percentages of the schedule that they have reached.
 
 Each robot's last place is saved too, because its fleet may be silent after the restart. Other states of
 robots and stations are not saved, because new states arrive within a second. A request may
@@ -15,6 +15,7 @@ from msgspec import Meta
 
 from bridges.kinds.charger.settings import RobotName, robot
 from bridges.kinds.charger_coordinator.memory import By, Grant, SiteMemory, Wish
+from bridges.kinds.charger_coordinator.schedule import Target
 from bridges.kinds.charger_coordinator.settings import CoordinatorSettings
 from bridges.kinds.shared import keep
 from bridges.kinds.shared.keep import Text
@@ -56,6 +57,7 @@ class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True, omit_d
     over: list[str]
     preferred: dict[Text, Text]
     stood: dict[Text, Text] = msgspec.field(default_factory=dict)
+    reached: dict[Text, Target] = msgspec.field(default_factory=dict)
 
 
 def persist(memories: Mapping[str, SiteMemory]) -> bytes:
@@ -71,6 +73,7 @@ def persist(memories: Mapping[str, SiteMemory]) -> bytes:
         list(memory.over),
         {str(who): station for who, station in sorted(memory.preferred.items()) if station},
         {str(who): place for who, place in sorted(memory.places.items()) if place},
+        {str(who): percent for who, percent in sorted(memory.reached.items())},
     )
     return msgspec.json.encode(record)
 
@@ -118,6 +121,7 @@ def _memory(found: KeptCoordinator, settings: CoordinatorSettings, now: float) -
         grants=grants,
         strikes={who: tuple(at) for text, at in found.strikes.items() if (who := ours(text))},
         served={who: task for text, task in found.served.items() if (who := ours(text))},
+        reached={who: percent for text, percent in found.reached.items() if (who := ours(text))},
         over=tuple(found.over),
         count=found.count,
         preferred={who: s for text, s in found.preferred.items() if (who := ours(text))},

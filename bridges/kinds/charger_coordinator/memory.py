@@ -97,7 +97,7 @@ WHOSE: Final[Mapping[By, str]] = {
 class Wish(msgspec.Struct, frozen=True):
     """One robot's need to be charged.
 
-    `by`: the origin of the wish (the fleet's state, the schedule, an operator). `task_id`: the robot's
+    `by`: the origin of the wish (the fleet's state, our schedule, an operator). `task_id`: the robot's
     task; empty for an operator's wish. `called`: the task `task_id` is the robot's drive to the
     station, because it began after the station was assigned to the robot. `station`, `request_id`,
     `start_timeout_s`: from the operator's request.
@@ -189,6 +189,11 @@ class StationSeen(msgspec.Struct, frozen=True):
         """The side at fault; NONE without an error."""
         return diagnosis(self.error) if self.state is ERROR else FaultCause.NONE
 
+    @property
+    def out_of_service(self) -> bool:
+        """Return whether the error is, or may be, the station's own."""
+        return self.diagnosis in (FaultCause.STATION, FaultCause.LOST, FaultCause.UNCLEAR)
+
 
 class Nudge(msgspec.Struct, frozen=True):
     """The orders that told a robot to leave a pad.
@@ -212,10 +217,12 @@ class SiteMemory(msgspec.Struct, frozen=True):
       refused.
     - `strikes`: the stations where each robot has failed. `served`: the task in which each robot was
       charged.
-    - `rested`: the robots that are already full enough for the entry of the schedule that applies now.
+    - `reached`: the percentage of the schedule that a robot has reached in the present time of the
+      schedule. The robot is charged again only for a higher percentage.
     - `absent`: a robot that did not drive to its assigned station -> the time when it may get a station
       again.
-    - `shunned`: a station that took no request -> the time until which the station is not used.
+    - `shunned`: a station that took no request, and has shown none since -> the time until which the
+      station is not used.
     - `preferred`: the station that another node has dedicated to each robot.
     - `nudges`: the orders to robots to leave a pad.
 
@@ -237,7 +244,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
     grants: Mapping[str, Grant] = msgspec.field(default_factory=dict)
     strikes: Mapping[RobotName, tuple[str, ...]] = msgspec.field(default_factory=dict)
     served: Mapping[RobotName, str] = msgspec.field(default_factory=dict)
-    rested: frozenset[RobotName] = frozenset()
+    reached: Mapping[RobotName, float] = msgspec.field(default_factory=dict)
     absent: Mapping[RobotName, float] = msgspec.field(default_factory=dict)
     over: tuple[str, ...] = ()
     count: int = 0
@@ -336,6 +343,11 @@ class SiteMemory(msgspec.Struct, frozen=True):
             return self
         over = (*self.over, wish.request_id)[-8:] if wish.request_id else self.over
         return replace(self, wishes=tuple(w for w in self.wishes if w is not wish), over=over)
+
+    def with_reached(self, robot: RobotName, aim: float) -> "SiteMemory":
+        """Return the memory in which this robot has reached the schedule's percentage `aim`."""
+        most = max(aim, self.reached.get(robot, 0.0))
+        return replace(self, reached={**self.reached, robot: most})
 
     def last_in_queue(self, robot: RobotName) -> "SiteMemory":
         """Return the memory with this robot's wish at the end of the queue."""

@@ -11,8 +11,9 @@ A robot may stand on a station's pad without a request, so that the station show
 unrequested charge. Such a robot may have that very station. A released robot that still stands at a
 station may have that station too.
 
-If a robot has failed at a station, the robot first tries every other suitable station. A second station
-shows which side is at fault.
+If a robot has failed at a station, the robot first tries every other suitable station, and waits for
+one that is busy. A second station shows which side is at fault. If every other station is out of order,
+the robot tries the station where it has failed.
 
 If another node publishes a charging schedule, a robot gets the station that the schedule has dedicated
 to the robot. The reason is that RMF drives the robot to no other station. A robot without a dedicated
@@ -36,6 +37,7 @@ from bridges.kinds.charger_coordinator.memory import (
     SiteMemory,
     Wish,
 )
+from bridges.kinds.charger_coordinator.stations import LOST_S
 
 Here = Mapping[str, Sequence[RobotName]]
 """The robots standing at each station."""
@@ -45,7 +47,7 @@ def allot(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Give the free stations to the waiting robots, in the order of the queue."""
     waiting, here = queued_and_standing(memory, site)
     for wish in waiting:
-        stations = suiting(memory, wish, site)
+        stations = suiting(memory, wish, now, site)
         station = next((s for s in stations if _free(memory, s, wish.robot, now, here)), None)
         if station is not None:
             memory = _granted(memory, wish, station, now, site)
@@ -75,12 +77,12 @@ def queued_and_standing(memory: SiteMemory, site: SiteLimits) -> tuple[list[Wish
     return waiting, standing(memory, site) if waiting else {}
 
 
-def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:
+def suiting(memory: SiteMemory, wish: Wish, now: float, site: SiteLimits) -> list[str]:
     """List the stations to try, best first.
 
     The operator's choice comes first, then the station at the robot's place, then the dedicated
     station. The other suitable stations follow in the YAML's order. A station where the robot has
-    failed is left out, unless the robot has failed at every suitable station.
+    failed is left out, unless all the others are out of order.
 
     If another node publishes the schedule, list only the operator's choice and the dedicated station.
     For a robot without a dedicated station, list the station where it stands in place of the dedicated
@@ -92,9 +94,19 @@ def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:
         scheduled = here or "" if dedicated is None else dedicated
         return [s for s in dict.fromkeys((wish.station, scheduled)) if s in site.places]
     suit, failed = site.robots[wish.robot], memory.strikes.get(wish.robot, ())
-    untried = [station for station in suit if station not in failed] or list(suit)
+    untried = [station for station in suit if station not in failed]
+    to_try = suit if all(_out_of_order(memory, name, now) for name in untried) else untried
     first = (wish.station, here, dedicated)
-    return sorted(untried, key=lambda s: first.index(s) if s in first else len(first))
+    return sorted(to_try, key=lambda s: first.index(s) if s in first else len(first))
+
+
+def _out_of_order(memory: SiteMemory, station: str, now: float) -> bool:
+    """Return whether the station does not serve robots. A silence or an error does not count at once,
+    because the station's daemon may only have been restarted."""
+    if now >= memory.silent_since(station) + LOST_S or now < memory.shunned.get(station, now):
+        return True
+    seen = memory.stations.get(station)
+    return seen is not None and seen.out_of_service and now >= seen.since + LOST_S
 
 
 def _free(memory: SiteMemory, station: str, robot: RobotName, now: float, here: Here) -> bool:

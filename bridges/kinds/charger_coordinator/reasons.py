@@ -38,7 +38,7 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
     taken: set[str] = set()
     waiting, here = queued_and_standing(memory, site)
     for wish in waiting:
-        stations = suiting(memory, wish, site)
+        stations = suiting(memory, wish, now, site)
         left = [name for name in stations if name not in taken]
         first = min(left, key=lambda name: free_in_s(memory, name, now), default=None)
         texts = [_obstacle(memory, name, wish.robot, now, here) for name in stations[:MOST]]

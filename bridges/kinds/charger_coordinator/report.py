@@ -7,7 +7,8 @@ COORDINATOR-REPORT-2. Every robot is assigned exactly one place. A robot with a 
    When a place changes, the assignments of all fleets are published. The publisher retains these
    messages for fleet adapters that start later. RMF drives a robot with a charging task to its assigned
    place (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
-COORDINATOR-REPORT-3. Each fault is sent once as an Alert, which rmf-web shows to a person.
+COORDINATOR-REPORT-3. Each fault is sent once as an Alert, which rmf-web shows to a person. The fault of
+   a station that took no request lasts through the next attempts, until the station shows a request.
 """
 
 from collections.abc import Iterator
@@ -141,7 +142,7 @@ def _faults(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[Fault]
             yield Fault("STATION_SILENT", f"{name}: no ChargerState comes")
         elif name in memory.stations:
             yield from _faults_of(memory, name, memory.stations[name], now, site)
-        if now < memory.shunned.get(name, now):
+        if name in memory.shunned:
             yield Fault("REQUEST_NOT_TAKEN", f"{name}: its daemon's log says why")
     for one in wrong_pad.found(memory, now, site).values():
         if wrong_pad.alarming(memory, one, now):
@@ -155,7 +156,7 @@ def _faults_of(
     memory: SiteMemory, name: str, seen: StationSeen, now: float, site: SiteLimits
 ) -> Iterator[Fault]:
     """Yield the faults in a station's state."""
-    if seen.diagnosis in (FaultCause.STATION, FaultCause.LOST, FaultCause.UNCLEAR):
+    if seen.out_of_service:
         yield Fault("STATION_OUT_OF_SERVICE", f"{name}: {seen.error}")
     if seen.diagnosis is not FaultCause.PAD:
         return

@@ -74,6 +74,11 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """Return the time from the beginning to the end (minutes): at most a day."""
         return (_minute(self.until) - _minute(self.at) - 1) % DAY_MIN + 1
 
+    def meets_clock_change(self) -> bool:
+        """Return whether this entry begins or ends in the hours in which clocks change for daylight
+        saving."""
+        return "01:00" <= self.at < "03:00" or "01:00" < self.until <= "03:00"
+
     def text(self, when: LocalTime | None) -> str:
         """Describe the times, robots and target: `22:00-05:00 mon tue tiny to 100 %: under way`."""
         days = "" if set(self.days) == set(DAYS) else f" {' '.join(self.days)}"

@@ -5,6 +5,7 @@
 
 import math
 from collections.abc import Iterator
+from datetime import datetime
 from typing import Annotated
 from zoneinfo import ZoneInfo
 
@@ -286,6 +287,19 @@ def warnings(settings: CoordinatorSettings) -> Remarks:
                 f"{only}: if a charge fails there, nothing shows whether robot or charger is at fault",
             )
     yield from _near(settings)
+    for i, one in enumerate(settings.schedule):
+        if one.meets_clock_change() and _clock_changes(settings.timezone):
+            entry = f"{one.at}-{one.until} begins or ends between 01:00 and 03:00"
+            why = "when clocks change for daylight saving, it may be missed or run twice"
+            yield ("schedule", str(i)), f"{entry}: {why}"
+
+
+def _clock_changes(timezone: str | None) -> bool:
+    """Return whether the zone may have daylight saving. The zone of another machine is not known."""
+    if timezone is None:
+        return True
+    zone = ZoneInfo(timezone)
+    return len({datetime(2026, month, 1, tzinfo=zone).utcoffset() for month in (1, 7)}) > 1
 
 
 def _near(settings: CoordinatorSettings) -> Remarks:

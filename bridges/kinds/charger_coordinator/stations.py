@@ -11,19 +11,22 @@ COORDINATOR-STATIONS-1. A station's state shows that a request has ended.
      has forgotten the request. The wish stays, and the request is sent again (`_forgot`). The restart
      may have switched the power off. Therefore a charge that ends within PROVEN_S of the restart counts
      as cut short.
+   - If a request is over before its station shows it, the station may still take it. The station is not
+     free until it has shown and released the request, or has not shown it within TAKEN_S.
 COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
    place in the queue. If the robot is at fault, or the side at fault is unclear, the error also counts
    as a failure of the robot. After a second failure the robot is not tried again, and the coordinator
-   alerts a technician. If two stations suit the robot, the first failure is at one of them and the
-   second at the other.
+   alerts a technician. If two stations suit the robot and are in order, the first failure is at one of
+   them and the second at the other.
 COORDINATOR-STATIONS-3. A failure of a robot is forgotten when the robot has been charged for PROVEN_S,
    or fully. The failure is also forgotten when the station proves to be at fault. One proof is an error
    that names the station. The other proof is an error that lasts for more than PROVEN_S after the robot
    has left.
 COORDINATOR-STATIONS-4. If another robot is on the pad, the assigned robot keeps the station for its
    start_timeout. If a station is out of reach, its error does not show whether the charge goes on. If a
-   robot was charging at that station, the robot keeps the station. If the robot is still on its way, it
-   gets another station after LOST_S.
+   robot was charging at that station, the robot keeps the station. It loses the station after LOST_S if
+   its fleet then sees it elsewhere, for PROVEN_S. If the robot is still on its way, it gets another
+   station after LOST_S.
 """
 
 from typing import Final
@@ -71,7 +74,7 @@ def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLi
         return memory
     if state.state is not IDLE and state.request_id == grant.request_id:
         return _followed(memory, name, grant, seen, now, site)
-    if grant.over:
+    if grant.over and (grant.shown or grant.started or now >= not_taken_at(grant)):
         return memory.with_grant(name, None)
     if grant.shown and seen.diagnosis is FaultCause.LOST:
         return memory
@@ -111,7 +114,7 @@ def _followed(
 ) -> SiteMemory:
     """Follow a station that shows our request."""
     grant = replace(grant, shown=True, started=grant.started or seen.state is CHARGING)
-    memory = memory.with_grant(name, grant)
+    memory = replace(memory, shunned=without(memory.shunned, name)).with_grant(name, grant)
     if grant.over:
         return memory
     if seen.state is RELEASED:
@@ -187,9 +190,11 @@ def _waits_at(memory: SiteMemory, station: str, site: SiteLimits) -> RobotName |
 def in_time(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Apply timeouts."""
     for name, grant in list(memory.grants.items()):
-        if grant.over or grant.started:
+        if grant.over or (grant.started and not left_lost(memory, name, grant, site)):
             continue
-        if memory.may_speak and not grant.shown and now >= not_taken_at(grant):
+        if grant.started:
+            memory = memory.takes_back(grant.robot)
+        elif memory.may_speak and not grant.shown and now >= not_taken_at(grant):
             shunned = {**memory.shunned, name: now + SHUNNED_S}
             memory = replace(memory, shunned=shunned).with_grant(name, None)
             memory = memory.last_in_queue(grant.robot)
@@ -218,6 +223,15 @@ def hopeless_at(memory: SiteMemory, name: str, grant: Grant) -> float:
     if seen is not None and seen.diagnosis is FaultCause.PAD:
         at = min(at, seen.since + max(grant.start_timeout_s, LOST_S))
     return at
+
+
+def left_lost(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> bool:
+    """Return whether the fleet sees a robot away from the station that charged it, although the station
+    cannot show that the charge has ended."""
+    standing = memory.robots.get(grant.robot)
+    if standing is None or memory.stands_at(grant.robot, site) == name:
+        return False
+    return standing.at >= max(hopeless_at(memory, name, grant), standing.here_since + PROVEN_S)
 
 
 def absent_at(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> float:

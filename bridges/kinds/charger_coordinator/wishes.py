@@ -15,6 +15,7 @@ COORDINATOR-WISHES-2. Between `again_percent` and `full_percent` the robot wants
    traffic on its pad. Therefore such a robot gets a wish only after LINGERS_S.
 COORDINATOR-WISHES-3. A robot without a task wants to be charged when the schedule says so. Within the
    time of one entry, the schedule charges the robot only once, unless the robot has worked in between.
+   If another entry with a higher percentage begins, the schedule charges the robot again.
 COORDINATOR-WISHES-4. A wish lasts as long as these rules hold, and also during the robot's drive to its
    station. The robot drives to the station in the same task, or without a task after a station was
    assigned to it. If a task begins within COMES_S of the assignment, that task is the drive. It is
@@ -59,7 +60,7 @@ def sighted(memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits
     who = sighting.who
     standing = _standing(memory.robots.get(who), sighting, now)
     memory = replace(memory, robots={**memory.robots, who: standing})
-    memory = _rested(_called(_served(memory, sighting), sighting, now), sighting, site)
+    memory = _reached(_called(_served(memory, sighting), sighting, now), sighting, site)
     wish = memory.wish(who)
     if wish is None:
         return _begun(memory, standing, now, site)
@@ -108,8 +109,8 @@ def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemor
     standing = memory.robots.get(who)
     served = {**memory.served, who: standing.sighting.task_id if standing else ""}
     memory = replace(memory, served=served, strikes=without(memory.strikes, who))
-    if schedule.target(site.schedule, who, memory.when):
-        memory = replace(memory, rested=memory.rested | {who})
+    if aim := schedule.target(site.schedule, who, memory.when):
+        memory = memory.with_reached(who, aim)
     return memory.without_wish(who)
 
 
@@ -153,17 +154,15 @@ def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
     return memory
 
 
-def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMemory:
-    """Note that a robot is full enough for the schedule. Forget this note when the entry's time is
-    over, or when the robot has worked."""
+def _reached(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMemory:
+    """Note the percentage of the schedule that a robot has reached. Forget this note when no entry is
+    under way, or when the robot has worked."""
     who = sighting.who
     aim = schedule.target(site.schedule, who, memory.when)
     worked = bool(sighting.task_id) and sighting.place is None
     if not aim or worked:
-        return replace(memory, rested=memory.rested - {who})
-    if sighting.battery_percent >= aim:
-        return replace(memory, rested=memory.rested | {who})
-    return memory
+        return replace(memory, reached=without(memory.reached, who))
+    return memory.with_reached(who, aim) if sighting.battery_percent >= aim else memory
 
 
 def _called(memory: SiteMemory, sighting: Sighting, now: float) -> SiteMemory:
@@ -200,11 +199,11 @@ def _asks(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits) 
         return None
     low = s.battery_percent < site.again_percent
     if s.charges and (low or _believed(memory, standing, now)):
-        return "schedule" if s.who in memory.preferred and not memory.alone else "fleet"
+        return "fleet"
     if s.charges or now < memory.absent.get(s.who, now):
         return None
     aim = schedule.target(site.schedule, s.who, memory.when)
-    if s.battery_percent < aim and s.who not in memory.rested:
+    if s.battery_percent < aim and memory.reached.get(s.who, 0.0) < aim:
         return "schedule"
     return "fleet" if low else None
 

@@ -127,7 +127,7 @@ def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWr
     waiting, here = queued_and_standing(memory, site)
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
     for wish in waiting if idle else ():
-        for name in suiting(memory, wish, site):
+        for name in suiting(memory, wish, now, site):
             who, seen = idle.get(name), memory.stations.get(name)
             if who is None or who == wish.robot or seen is None:
                 continue

@@ -20,6 +20,7 @@ from bridges.kinds.charger_coordinator.memory import (
 )
 from bridges.kinds.charger_coordinator.signals import (
     ChargerStateHeard,
+    ChargeUnwanted,
     ChargeWanted,
     Dedicated,
     Event,
@@ -34,6 +35,13 @@ from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, THREE, TWO, A, 
 from tests.kinds.charger_coordinator.virtual_site import RECEIVERS
 
 SERVED = [CHARGING, RELEASED]
+
+
+class Alerted(Alone):
+    """The core alone. `sent` has the alerts only."""
+
+    def words(self, message: d.Message) -> str:
+        return message.message if isinstance(message, d.Alert) else ""
 
 
 # ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2: which robots want to be charged
@@ -170,6 +178,35 @@ def test_no_event_that_counts_is_refused() -> None:
     assert [answer(site_, event) for event in events] == [""] * 5
 
 
+def test_a_request_withdrawn_before_its_station_shows_it_is_cancelled_and_does_not_come_back() -> (
+    None
+):
+    site_ = Alone()
+    site_.seen[ONE] = Sighting(ONE, False, "wait_1", 95.0, "")
+    site_.run(1)
+    site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
+    site_.hears(ChargeUnwanted("op-1"))
+    site_.hears(ChargerStateHeard(A, IDLE))
+    site_.does(A, ASSIGNED)
+    site_.run(1)
+    site_.does(A, RELEASED)
+    site_.run(1)
+    site_.shows[A] = ChargerStateHeard(A, IDLE)
+    site_.run(10)
+    assert site_.sent == [(1.0, "charger_a: AMR01"), (2.0, "charger_a: cancel")]
+    assert (site_.memory.wishes, site_.memory.grants) == ((), {})
+
+
+def test_a_station_that_never_shows_a_withdrawn_request_is_free_after_ten_seconds() -> None:
+    site_ = Alone()
+    site_.shows[B] = busy(B)
+    site_.run(1)
+    site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
+    site_.hears(ChargeUnwanted("op-1"))
+    site_.wants(TWO)
+    assert site_.run(20)[0] == (11.0, "charger_a: AMR02")
+
+
 # ---- COORDINATOR-3: a station that does not accept its request
 
 
@@ -184,7 +221,17 @@ def test_a_station_that_accepts_no_request_is_passed_over_and_its_robot_is_queue
     assert site_.faults == ["REQUEST_NOT_TAKEN: charger_a: its daemon's log says why"]
     assert site_.run(29) == []
     assert site_.run(1) == [(41.0, "charger_a: AMR02")]
+    site_.does(A, ASSIGNED)
+    site_.run(1)
     assert site_.faults == []
+
+
+def test_a_station_that_takes_no_request_for_an_hour_causes_one_alert() -> None:
+    site_ = Alerted()
+    site_.shows[B] = busy(B)
+    site_.wants(ONE)
+    site_.run(3600)
+    assert site_.sent == [(11.0, "charger_a: its daemon's log says why")]
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,9 @@ def test_a_restart_remembers_everything_that_it_keeps() -> None:
     site_.wants(THREE)
     site_.run(1)
     wishes = tuple(replace(wish, called=wish.robot == THREE) for wish in site_.memory.wishes)
-    before = replace(site_.memory, wishes=wishes, served={THREE: "task of AMR03"})
+    before = replace(
+        site_.memory, wishes=wishes, served={THREE: "task of AMR03"}, reached={TWO: 95.0}
+    )
     after = keep.restore(keep.persist({"site": before}), SETTINGS, 50.0)["site"]
     assert (after.wishes, after.strikes, after.served) == (
         before.wishes,
@@ -80,6 +82,7 @@ def test_a_restart_remembers_everything_that_it_keeps() -> None:
         before.count,
         before.preferred,
     )
+    assert after.reached == {TWO: 95.0}
     assert (before.strikes, before.over, before.preferred) == ({ONE: (A,)}, ("op-1",), {TWO: B})
     for name, grant in before.grants.items():
         kept = after.grants[name]
@@ -90,6 +93,12 @@ def test_a_restart_remembers_everything_that_it_keeps() -> None:
             50.0,
         )
     assert after.began_at == 50.0
+
+
+def test_a_memory_of_an_earlier_version_has_no_reached_percentages_and_is_restored() -> None:
+    kept = keep.persist({})
+    assert b"reached" not in kept
+    assert keep.restore(kept, SETTINGS, 0.0)["site"].reached == {}
 
 
 def test_a_coordinator_that_remembers_nothing_keeps_an_empty_memory() -> None:

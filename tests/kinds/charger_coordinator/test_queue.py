@@ -124,7 +124,7 @@ def test_beside_a_charging_schedule_a_robot_without_a_dedicated_station_may_have
     for place, stations in (("charger_a", [A]), ("wait_1", [])):
         seen = {ONE: Standing(Sighting(ONE, True, place, 40.0, ""), 0.0)}
         at_place = replace(memory, robots=seen)
-        assert suiting(at_place, Wish(ONE, "fleet"), SiteLimits.of(SETTINGS)) == stations
+        assert suiting(at_place, Wish(ONE, "fleet"), 0.0, SiteLimits.of(SETTINGS)) == stations
 
 
 def test_a_robot_that_stands_at_a_station_gets_that_station() -> None:
@@ -169,7 +169,8 @@ def test_only_the_robot_on_its_pad_may_get_a_station_in_error() -> None:
     assert site_.run(5) == []
 
 
-def test_a_robot_waits_for_a_station_where_it_has_not_failed() -> None:
+def failed_once_at_a() -> Alone:
+    """Return a site in which AMR01 waits, and has failed at charger_a."""
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.wants(ONE)
@@ -177,6 +178,39 @@ def test_a_robot_waits_for_a_station_where_it_has_not_failed() -> None:
     site_.does(A, ERROR, "robot: handshake timeout")
     site_.run(1)
     site_.shows[A] = ChargerStateHeard(A, IDLE)
+    return site_
+
+
+def test_a_robot_waits_for_a_station_where_it_has_not_failed() -> None:
+    site_ = failed_once_at_a()
     assert site_.run(5) == []
     site_.shows[B] = ChargerStateHeard(B, IDLE)
     assert site_.run(1) == [(8.0, "charger_b: AMR01")]
+
+
+def test_a_robot_is_tried_again_where_it_failed_while_the_other_station_is_silent() -> None:
+    site_ = failed_once_at_a()
+    del site_.shows[B]
+    assert site_.run(60)[:1] == [(37.0, "charger_a: AMR01")]
+
+
+@pytest.mark.parametrize("error", ["station: fan", "Charger unreachable", "over temperature"])
+def test_a_robot_is_tried_again_where_it_failed_while_the_other_station_is_out_of_service(
+    error: str,
+) -> None:
+    site_ = failed_once_at_a()
+    site_.shows[B] = ChargerStateHeard(B, ERROR, "unrequested/charger_b", None, error)
+    assert site_.run(60)[:1] == [(33.0, "charger_a: AMR01")]
+
+
+def test_a_robot_is_tried_again_where_it_failed_while_the_other_station_takes_no_request() -> None:
+    site_ = failed_once_at_a()
+    site_.shows[B] = ChargerStateHeard(B, IDLE)
+    assert [at for at, words in site_.run(20) if words == "charger_a: AMR01"][:1] == [13.0]
+
+
+def test_a_robot_that_has_failed_waits_while_another_robot_blocks_the_other_station() -> None:
+    site_ = failed_once_at_a()
+    text = "wrong docking: tiny/AMR02 is not assigned here"
+    site_.shows[B] = ChargerStateHeard(B, ERROR, "unrequested/charger_b", TWO, text)
+    assert site_.run(60) == []

@@ -8,6 +8,7 @@ import pytest
 from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator import messages
 from bridges.kinds.charger_coordinator.schedule import DAYS, Charging, LocalTime, target
+from bridges.kinds.charger_coordinator.settings import warnings
 from bridges.settings.load import SettingsError, load
 from tests.kinds.charger_coordinator.virtual_site import settings
 
@@ -144,3 +145,31 @@ def test_a_scheduled_time_begins_and_ends_at_its_minutes() -> None:
     times = ("11:44", "11:45", "13:19", "13:20")
     assert [lunch.under_way(at(clock)) for clock in times] == [False, True, True, False]
     assert lunch.text(None) == "11:45-13:20 mon tiny big/B01 to 100 %"
+
+
+@pytest.mark.parametrize(
+    ("begins", "ends", "timezone", "warned"),
+    [
+        ("22:00", "02:30", "Europe/Berlin", True),
+        ("02:00", "02:45", None, True),
+        ("01:00", "05:00", "America/New_York", True),
+        ("02:59", "05:00", "Europe/London", True),
+        ("22:00", "03:00", "Australia/Sydney", True),
+        ("22:00", "01:00", "Europe/Berlin", False),
+        ("03:00", "05:00", "Europe/Berlin", False),
+        ("22:00", "05:00", "Europe/Berlin", False),
+        ("02:00", "02:45", "Asia/Singapore", False),
+    ],
+)
+def test_an_entry_that_a_change_of_the_clocks_may_drop_or_repeat_gives_a_warning(
+    begins: str, ends: str, timezone: str | None, warned: bool
+) -> None:
+    night = Charging(at="22:00", until="05:00")
+    entries = [night, Charging(at=begins, until=ends)]
+    site = settings(schedule=entries, timezone=timezone)
+    found = [(path, text) for path, text in warnings(site) if path[0] == "schedule"]
+    text = (
+        f"{begins}-{ends} begins or ends between 01:00 and 03:00: when clocks change for daylight"
+        " saving, it may be missed or run twice"
+    )
+    assert found == ([(("schedule", "1"), text)] if warned else [])

@@ -233,6 +233,29 @@ def test_an_unreachable_station_that_shows_no_request_keeps_its_charging_robot()
     assert after(charging, ERROR, LOST, request_id="") == charging
 
 
+@pytest.mark.parametrize(
+    ("place", "since", "seen_at", "loses"),
+    [
+        ("wait_1", 25.0, 40.0, True),
+        (None, 25.0, 40.0, True),
+        ("wait_1", 25.0, 39.9, False),
+        ("wait_1", 30.1, 40.0, False),
+        ("charger_a", 25.0, 90.0, False),
+    ],
+)
+def test_a_robot_loses_the_lost_station_that_charged_it_once_its_fleet_has_seen_it_elsewhere(
+    place: str | None, since: float, seen_at: float, loses: bool
+) -> None:
+    charging = replace(GRANT, started=True)
+    known = {A: shows(ERROR, LOST, heard=89.0)}
+    robots = {ONE: replace(at(ONE, place, since), at=seen_at)}
+    memory = site(grants={A: charging}, stations=known, robots=robots)
+    left = replace(memory, grants={A: replace(charging, over=True, sent_at=AGES_AGO)})
+    assert stations.in_time(memory, 90.0, SITE) == (left if loses else memory)
+    unseen = replace(memory, robots={})
+    assert stations.in_time(unseen, 90.0, SITE) == unseen
+
+
 def test_a_robot_that_stays_away_is_given_up() -> None:
     memory = site(stations={A: shows(ASSIGNED, heard=69.0)})
     assert stations.in_time(memory, 69.9, SITE) == memory

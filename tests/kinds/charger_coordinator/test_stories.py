@@ -7,11 +7,12 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.charger.settings import RobotName
+from bridges.kinds.charger_coordinator.schedule import Charging
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.transports.transport import Publisher
-from tests.kinds.charger_coordinator.virtual_site import Yard
+from tests.kinds.charger_coordinator.virtual_site import Yard, settings
 
 
 def yard(**changes: object) -> Yard:
@@ -371,7 +372,7 @@ def test_beside_the_charging_schedule_of_rmf_its_dedicated_stations_get_requests
     assert site.node.status()["passive"] is False
     assert status["assigns"] == "no: another node publishes charging_assignments"
     assert status["queue"] == (
-        "tiny/AMR02 by the schedule: the charging schedule has no station for this robot"
+        "tiny/AMR02 by the robot: the charging schedule has no station for this robot"
     )
     again = dedicate(site, AMR02="charger_a")
     assert site.run(40.0) == [
@@ -382,6 +383,22 @@ def test_beside_the_charging_schedule_of_rmf_its_dedicated_stations_get_requests
     ]
     for end in (schedule, again):
         end.close()
+
+
+def test_beside_the_charging_schedule_of_rmf_our_schedule_ends_no_charge() -> None:
+    site = yard(site=settings(schedule=[Charging(at="22:00", until="23:00")]))
+    schedule = dedicate(site, AMR01="charger_a")
+    site.run(6.0)
+    site.story.clear()
+    site.fleet.charge("AMR01", site.now, 93.0)
+    assert site.run(300.0) == [
+        (10.0, "charger_a: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)"),
+        (12.25, "charger_a <- charge AMR01"),
+        (12.25, "charger_a: ASSIGNED AMR01"),
+        (14.25, "charger_a: CHARGING AMR01"),
+        (16.0, "charger_a: RELEASED AMR01"),
+    ]
+    schedule.close()
 
 
 def test_a_station_is_taken_back_if_the_schedule_sends_the_robot_elsewhere_on_its_way() -> None:
@@ -446,6 +463,20 @@ def test_a_charge_goes_on_at_an_unreachable_station() -> None:
     ]
     site.chargers["charger_a"].unplugged = False
     assert site.run(70.0) == [(60.25, "charger_a: CHARGING AMR01")]
+
+
+def test_a_robot_that_has_left_a_dead_charger_for_a_task_is_charged_at_another() -> None:
+    site = charges_at_a(by_operator=True, knows=True)
+    site.chargers["charger_a"].dead = True
+    site.fleet.works("AMR01", "ward", site.now)
+    site.run(300.0)
+    site.fleet.charge("AMR01", site.now, 20.0)
+    assert site.run(330.0) == [
+        (306.25, "charger_b <- charge AMR01"),
+        (306.25, "charger_b: ASSIGNED AMR01"),
+        (306.25, "AMR01 -> CHARGE dock_b"),
+        (312.25, "charger_b: CHARGING AMR01"),
+    ]
 
 
 def test_a_robot_on_its_way_to_a_station_that_falls_silent_is_sent_to_another() -> None:

@@ -168,7 +168,7 @@ def test_a_full_robot_counts_as_served_and_its_failures_are_forgotten(by: By) ->
 def test_a_robot_that_the_schedule_has_charged_far_enough_counts_as_served() -> None:
     memory = charged("schedule", when=AT_NIGHT)
     enough = after(memory, seen("charger_a", 95.0, "t1", True), 30.0, SCHEDULED)
-    assert (enough.served, enough.rested) == ({ONE: "t1"}, frozenset({ONE}))
+    assert (enough.served, enough.reached) == ({ONE: "t1"}, {ONE: 95.0})
     assert after(memory, seen("charger_a", 94.9, "t1", True), 30.0, SCHEDULED) == memory
 
 
@@ -183,14 +183,14 @@ def test_a_robot_that_leaves_before_it_is_full_does_not_count_as_served() -> Non
 
 def test_a_robot_charged_by_the_schedule_rests_until_the_end_of_the_scheduled_time() -> None:
     memory = charged("schedule", when=AT_NIGHT)
-    for site, rested in ((SCHEDULED, frozenset({ONE})), (SITE, frozenset[RobotName]())):
-        assert wishes.fulfilled(memory, ONE, site).rested == rested
-    by_day = replace(memory, when=AT_NOON, rested=frozenset({TWO}))
-    assert wishes.fulfilled(by_day, ONE, SCHEDULED).rested == {TWO}
-    two = replace(memory, rested=frozenset({ONE}))
-    assert wishes.fulfilled(two, TWO, SCHEDULED).rested == {ONE}
-    both = replace(memory, rested=frozenset({TWO}))
-    assert wishes.fulfilled(both, ONE, SCHEDULED).rested == {ONE, TWO}
+    for site, reached in ((SCHEDULED, {ONE: 95.0}), (SITE, {})):
+        assert wishes.fulfilled(memory, ONE, site).reached == reached
+    by_day = replace(memory, when=AT_NOON, reached={TWO: 95.0})
+    assert wishes.fulfilled(by_day, ONE, SCHEDULED).reached == {TWO: 95.0}
+    two = replace(memory, reached={ONE: 95.0})
+    assert wishes.fulfilled(two, TWO, SCHEDULED).reached == {ONE: 95.0}
+    both = replace(memory, reached={TWO: 70.0, ONE: 99.0})
+    assert wishes.fulfilled(both, ONE, SCHEDULED).reached == {TWO: 70.0, ONE: 99.0}
 
 
 @pytest.mark.parametrize(
@@ -204,22 +204,41 @@ def test_a_robot_charged_by_the_schedule_rests_until_the_end_of_the_scheduled_ti
     ],
 )
 def test_a_robot_rests_until_its_next_task(sighting: Sighting, rests: bool) -> None:
-    memory = SiteMemory(when=AT_NIGHT, rested=frozenset({ONE, TWO}))
-    rested = after(memory, sighting, 30.0, SCHEDULED).rested
-    assert rested == ({ONE, TWO} if rests else {TWO})
+    memory = SiteMemory(when=AT_NIGHT, reached={ONE: 95.0, TWO: 95.0})
+    reached = after(memory, sighting, 30.0, SCHEDULED).reached
+    assert reached == ({ONE: 95.0, TWO: 95.0} if rests else {TWO: 95.0})
 
 
 def test_a_robot_that_is_full_enough_rests_only_during_the_scheduled_time() -> None:
-    for when, percent, rested in (
-        (AT_NIGHT, 95.0, {ONE, TWO}),
-        (AT_NIGHT, 94.9, {TWO}),
-        (AT_NOON, 100.0, {TWO}),
-        (None, 100.0, {TWO}),
+    for when, percent, reached in (
+        (AT_NIGHT, 96.0, {ONE: 95.0, TWO: 95.0}),
+        (AT_NIGHT, 95.0, {ONE: 95.0, TWO: 95.0}),
+        (AT_NIGHT, 94.9, {TWO: 95.0}),
+        (AT_NOON, 100.0, {TWO: 95.0}),
+        (None, 100.0, {TWO: 95.0}),
     ):
-        memory = SiteMemory(when=when, rested=frozenset({TWO}))
-        assert after(memory, seen(percent=percent), 30.0, SCHEDULED).rested == rested
-    over = SiteMemory(when=AT_NOON, rested=frozenset({ONE, TWO}))
-    assert after(over, seen(), 30.0, SCHEDULED).rested == {TWO}
+        memory = SiteMemory(when=when, reached={TWO: 95.0})
+        assert after(memory, seen(percent=percent), 30.0, SCHEDULED).reached == reached
+    over = SiteMemory(when=AT_NOON, reached={ONE: 95.0, TWO: 95.0})
+    assert after(over, seen(), 30.0, SCHEDULED).reached == {TWO: 95.0}
+
+
+@pytest.mark.parametrize(
+    ("begins", "percent", "again"),
+    [("02:00", 70.0, True), ("23:00", 75.0, True), ("02:00", 100.0, False)],
+)
+def test_a_later_entry_with_a_higher_percentage_charges_a_robot_again(
+    begins: str, percent: float, again: bool
+) -> None:
+    evening = Charging(at="20:00", until="02:00" if begins == "02:00" else "06:00", percent=70.0)
+    entries = [evening, Charging(at=begins, until="06:00", percent=100.0)]
+    site = SiteLimits.of(settings(schedule=entries, again_percent=50.0))
+    memory = SiteMemory(when=LocalTime(0, 21 * 60), robots={ONE: Standing(seen(), 10.0)})
+    rests = after(memory, seen(percent=percent), 30.0, site)
+    assert rests.wishes == ()
+    later = replace(rests, when=LocalTime(1, 3 * 60))
+    found = after(later, seen(percent=percent), 30.0, site).wishes
+    assert found == ((Wish(ONE, "schedule"),) if again else ())
 
 
 @pytest.mark.parametrize(
@@ -317,12 +336,11 @@ def test_the_memory_has_the_time_since_a_robot_has_stood_and_done_the_same(
         (seen(percent=10.0), {"when": AT_NIGHT}, "schedule"),
         (seen(percent=95.0), {"when": AT_NIGHT}, None),
         (seen(percent=94.9), {"when": AT_NOON}, None),
-        (seen(percent=94.9), {"when": AT_NIGHT, "rested": frozenset({ONE})}, None),
-        (seen(percent=94.9), {"when": AT_NIGHT, "rested": frozenset({TWO})}, "schedule"),
-        (seen(percent=80.0), {"when": AT_NIGHT, "rested": frozenset({ONE})}, "fleet"),
-        (seen(percent=9.0, charges=True), {"preferred": {ONE: A}, "alone": False}, "schedule"),
-        (seen(percent=9.0, charges=True), {"preferred": {TWO: A}, "alone": False}, "fleet"),
-        (seen(percent=9.0, charges=True), {"preferred": {ONE: A}}, "fleet"),
+        (seen(percent=94.9), {"when": AT_NIGHT, "reached": {ONE: 95.0}}, None),
+        (seen(percent=94.9), {"when": AT_NIGHT, "reached": {ONE: 94.0}}, "schedule"),
+        (seen(percent=94.9), {"when": AT_NIGHT, "reached": {TWO: 95.0}}, "schedule"),
+        (seen(percent=80.0), {"when": AT_NIGHT, "reached": {ONE: 95.0}}, "fleet"),
+        (seen(percent=9.0, charges=True), {"preferred": {ONE: A}, "alone": False}, "fleet"),
     ],
 )
 def test_battery_task_and_schedule_decide_whether_a_standing_robot_has_a_wish(
