@@ -64,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_USAGE
     try:
         config = load(args.file)
-        config = replace(config, rmf=overridden(config.rmf, args))
+        path = config.path.absolute()  # now, because `work_somewhere` changes the directory
+        config = replace(config, path=path, rmf=overridden(config.rmf, args))
         if (
             config.kind == "fleet"
         ):  # find errors in RMF's files before anything starts; recordings need their texts

@@ -106,9 +106,11 @@ def _switched_off(places: Directories) -> int:
     _make_runtime(places)
     act_as_owner(places)
     os.environ |= {"RUNTIME_DIRECTORY": str(places.runtime), "STATE_DIRECTORY": str(places.state)}
-    files = {Path(record.file) for record in map(read, places.state.glob(PATTERN)) if record}
-    told = [argparse.Namespace(file=file, runtime_dir=None, record=[]) for file in sorted(files)]
-    return max(map(dead_daemon.switch_off, told), default=1)
+    files = [record.file for record in map(read, places.state.glob(PATTERN)) if record]
+    if not files:
+        return 1
+    told = argparse.Namespace(file=Path(min(files)), runtime_dir=None, record=[])
+    return dead_daemon.switch_off(told)  # uses the records of the other files too
 
 
 def _make_runtime(places: Directories) -> None:

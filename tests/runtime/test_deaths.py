@@ -177,6 +177,49 @@ def test_a_daemon_by_hand_that_is_killed_has_a_guard_that_switches_off(
     assert [path.name for path in (tmp_path / "run").glob("claimed-*")] == []
 
 
+def test_the_guard_of_a_relative_path_uses_the_record_and_not_the_edited_file(
+    module: Module, graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(module.directory)
+    with daemon(Path(module.file.name), tmp_path / "run") as running:
+        hold_open(module, graph, running)
+        module.file.write_text(module.yaml.replace("coil 0", "coil 5"))
+        running.end(signal.SIGKILL)
+        _off(module)
+        wait_until(lambda: not [*(tmp_path / "run").glob("claimed-*")], "the record is removed")
+
+
+def test_the_guard_of_a_link_uses_the_record_though_the_link_leads_to_another_file_now(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    link, new = tmp_path / "ward_door.yaml", tmp_path / "new.yaml"
+    link.symlink_to(module.file)
+    new.write_text(module.yaml.replace("ward_door", "other_door"))
+    with daemon(link, tmp_path / "run") as running:
+        hold_open(module, graph, running)
+        link.unlink()
+        link.symlink_to(new)
+        running.end(signal.SIGKILL)
+        _off(module)
+        wait_until(lambda: not [*(tmp_path / "run").glob("claimed-*")], "the record is removed")
+        assert "record_of_another_file" in running.log.read_text()
+
+
+def test_another_file_in_one_directory_switches_a_daemons_outputs_off_only_after_its_death(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    other = tmp_path / "other.yaml"
+    other.write_text(module.yaml.replace("ward_door", "other_door"))
+    off = ("outputs-off", other, "--runtime-dir", tmp_path / "run")
+    with daemon(module.file, tmp_path / "run", **SERVICE) as running:
+        hold_open(module, graph, running)
+        assert (_told(*off).returncode, module.relay()) == (os.EX_UNAVAILABLE, [True])
+        running.end(signal.SIGKILL)
+    done = _told(*off)
+    assert (done.returncode, done.stderr.count("outputs_off device=")) == (0, 2), done.stderr
+    _off(module)
+
+
 def test_the_guard_tries_until_hardware_that_was_silent_at_the_death_answers(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:

@@ -119,12 +119,12 @@ def test_a_daemon_on_another_yaml_overwrites_no_unreleased_claim(tmp_path: Path)
     second.close()
 
 
-def test_a_record_counts_only_for_the_file_that_it_names(tmp_path: Path) -> None:
+def test_a_record_of_another_file_with_the_same_directory_counts_too(tmp_path: Path) -> None:
     first = held(tmp_path)
     first.claim(CLAIMED)
     first.close()
     other = held(tmp_path, file=Path("/home/pi/lift.yaml"))
-    assert other.records.unreleased() == []
+    assert other.records.unreleased() == [CLAIMED]
     other.close()
 
 
