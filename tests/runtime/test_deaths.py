@@ -21,6 +21,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.messages.definitions import DoorModeValue
+from bridges.runtime import order
 from bridges.runtime.holder import HOLDER, ourselves
 from bridges.runtime.signals import ENDING, WRITES
 from hal_fakes.wire import wire
@@ -134,10 +135,25 @@ def test_signals_that_end_nothing_by_default_or_only_a_write_leave_the_door_held
 ) -> None:
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
         hold_open(module, graph, running)
-        for number in (signal.SIGWINCH, signal.SIGCHLD, signal.SIGCONT, signal.SIGUSR1, *WRITES):
+        usr1s = [signal.SIGUSR1] * 2000
+        for number in (signal.SIGWINCH, signal.SIGCHLD, signal.SIGCONT, *usr1s, *WRITES):
             running.process.send_signal(number)
         _states_go_on(graph)
         assert module.relay() == [True]
+        running.wait_for("no_order")
+        assert "ordered what=" not in running.log.read_text()
+
+
+def test_orders_of_several_people_at_one_time_are_all_obeyed_and_answered(
+    module: Module, tmp_path: Path
+) -> None:
+    with daemon(module.file, tmp_path / "run", **SERVICE) as running:
+        running.wait_for("ready")
+        drill = command("drill", "--end", module.file, "--runtime-dir", tmp_path / "run")
+        people = [subprocess.Popen(drill, env=environment()) for _ in range(3)]
+        assert [one.wait(PATIENCE_S) for one in people] == [order.REFUSED] * 3
+        said = running.log.read_text()
+    assert (said.count("ordered what="), said.count("ordered what=DrillOrdered")) == (3, 3)
 
 
 def test_a_closed_terminal_releases_the_relay(module: Module, graph: Graph, tmp_path: Path) -> None:
