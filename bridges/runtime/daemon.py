@@ -23,7 +23,7 @@ from bridges.blackbox.ring import Ring
 from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
-from bridges.runtime import guard, last_mark, order, record, signals
+from bridges.runtime import guard, holder, last_mark, order, record, signals
 from bridges.runtime.diagnostics import CERTIFICATE_FILES, diagnosis
 from bridges.runtime.guard import Guard
 from bridges.runtime.notify import notify, watchdog_s
@@ -80,6 +80,8 @@ class Daemon:
         self._end = end
         self._simulated = simulated
         self._once = Once()
+        ourselves = holder.ourselves(config.path, serves=True)
+        self._process = {"boot": ourselves.boot, "started": ourselves.started}
         self._guard: Guard | None = None
         self._predecessor: Predecessor | None = None
         ours, unsafe = record.of(config), frozenset[str]()
@@ -281,7 +283,7 @@ class Daemon:
         }
         devices = self._service.devices()
         answer = self._answer()
-        answered = {"order": answer, "devices": devices}
+        answered = {"order": answer, "devices": devices, **self._process}
         self._runtime.write_status(msgspec.json.encode({**daemon, **answered}))
         if answer:
             self._next_order_at = min(self._next_order_at, time.monotonic() + SHOWN_S)
