@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
     Raises NotInstalled if `--simulate` needs the fakes, which are not installed.
     """
-    log.start(args.log_level.upper(), json=args.log_format == "json")
+    log.start(args.log_level.upper(), json=args.log_format == "json", unhurried=True)
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: RMF_BRIDGE_SERVICE=1 forbids --simulate")
         return os.EX_USAGE

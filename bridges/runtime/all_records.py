@@ -46,7 +46,7 @@ def switch_off_all(
     others_s: float = OTHERS_S,
 ) -> int:
     """Return 0 if every output in the records is verified off, else 1. `files`: the services' YAMLs."""
-    log.start()
+    log.start(unhurried=True)
     own, others = list[Directories](), list[Directories]()
     for folder in sorted({path.parent for path in state.glob(f"*/{PATTERN}")}):
         yaml = _loaded(files / f"{folder.name}.yaml")
@@ -98,6 +98,7 @@ def _forked(places: Directories) -> int:
     except BaseException:
         logging.exception(pairs("outputs_off_failed", service=places.state.name))
     finally:
+        logging.shutdown()  # writes the last lines
         os._exit(code)
 
 

@@ -32,7 +32,7 @@ TIMEOUT_S = 5.0
 def switch_off(args: argparse.Namespace) -> int:
     """Switch the outputs off. Return 0 if every output is verified off, otherwise 1. Return 69 if the
     daemon may still be alive."""
-    log.start()
+    log.start(unhurried=True)
     signals.ignore()
     file = args.file.absolute()
     try:

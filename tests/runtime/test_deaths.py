@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import msgspec
@@ -67,6 +68,15 @@ def module(wall: tuple[Module, Graph]) -> Module:
     standing.edges.clear()
     joined.states.clear()
     return standing
+
+
+def fill(pipe: int) -> None:
+    """Fill a pipe that nobody reads."""
+    os.set_blocking(pipe, False)
+    with suppress(BlockingIOError):
+        while os.write(pipe, b"x"):
+            pass
+    os.set_blocking(pipe, True)
 
 
 def _off(module: Module) -> None:
@@ -154,6 +164,56 @@ def test_orders_of_several_people_at_one_time_are_all_obeyed_and_answered(
         assert [one.wait(PATIENCE_S) for one in people] == [order.REFUSED] * 3
         said = running.log.read_text()
     assert (said.count("ordered what="), said.count("ordered what=DrillOrdered")) == (3, 3)
+
+
+def test_an_unread_log_delays_neither_a_request_nor_the_end_nor_outputs_off(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    """The reader of the log has stopped reading, as after Ctrl-S or with a log shipper that hangs."""
+    run, (read, unread), heard = tmp_path / "run", os.pipe(), b""
+    processes = ExitStack()
+
+    def started(word: str) -> "subprocess.Popen[bytes]":
+        process = subprocess.Popen(
+            command(word, module.file, "--runtime-dir", run),
+            env=environment(**SERVICE),
+            stderr=unread,
+        )
+        processes.callback(process.kill)
+        return process
+
+    def asked(mode: DoorModeValue, relay: bool) -> None:
+        def done() -> bool:
+            graph.ask(mode)
+            return module.relay()[-1:] == [relay]
+
+        wait_until(done, f"the relay is {relay}")
+
+    with processes:
+        for end in (signal.SIGTERM, signal.SIGKILL):
+            running = started("run")
+            while b" ready " not in heard:
+                heard += os.read(read, 4096)
+            fill(unread)
+            for mode, relay in (
+                (DoorModeValue.MODE_OPEN, True),
+                (DoorModeValue.MODE_CLOSED, False),
+            ):
+                asked(mode, relay)
+            asked(DoorModeValue.MODE_OPEN, True)
+            running.send_signal(end)
+            assert running.wait(PATIENCE_S) == (0 if end is signal.SIGTERM else -end)
+            if end is signal.SIGKILL:
+                assert started("outputs-off").wait(PATIENCE_S) == 0
+            _off(module)
+            os.set_blocking(read, False)
+            with suppress(BlockingIOError):
+                while os.read(read, 65536):
+                    pass
+            os.set_blocking(read, True)
+            heard = b""
+    os.close(read)
+    os.close(unread)
 
 
 def test_a_closed_terminal_releases_the_relay(module: Module, graph: Graph, tmp_path: Path) -> None:
