@@ -88,9 +88,8 @@ class Daemon:
         if config.drives and not simulated:
             self._predecessor = Predecessor(runtime.records, ours, outputs_off)
             unsafe = self._predecessor.make_safe(end.wait)
-        node_name = f"rmf_bridge_{config.path.stem}"
         self._transport = open_transport(
-            config.rmf, node_name, localhost=localhost, ros_args=ros_args
+            config.rmf, config.node, localhost=localhost, ros_args=ros_args
         )
         # A memory of devices gets no second path. Two files could differ, and an old memory of devices
         # is worse than no memory.
