@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
         places = order.places_of(args.file, args.runtime_dir)
         if places is None:
             return 1
-        code = order.give(args.file, places)
+        code = order.give(args.file, places, reset=True)
         if code in (0, order.REFUSED):
             print(_remains(places) or "reset; no fault remains")
         return code

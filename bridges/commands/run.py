@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
     Raises NotInstalled if `--simulate` needs the fakes, which are not installed.
     """
-    log.start(args.log_level.upper(), json=args.log_format == "json")
+    log.start(args.log_level.upper(), json=args.log_format == "json", unhurried=True)
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: RMF_BRIDGE_SERVICE=1 forbids --simulate")
         return os.EX_USAGE
@@ -64,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_USAGE
     try:
         config = load(args.file)
-        config = replace(config, rmf=overridden(config.rmf, args))
+        path = config.path.absolute()  # now, because `work_somewhere` changes the directory
+        config = replace(config, path=path, rmf=overridden(config.rmf, args))
         if (
             config.kind == "fleet"
         ):  # find errors in RMF's files before anything starts; recordings need their texts

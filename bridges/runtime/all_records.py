@@ -46,7 +46,7 @@ def switch_off_all(
     others_s: float = OTHERS_S,
 ) -> int:
     """Return 0 if every output in the records is verified off, else 1. `files`: the services' YAMLs."""
-    log.start()
+    log.start(unhurried=True)
     own, others = list[Directories](), list[Directories]()
     for folder in sorted({path.parent for path in state.glob(f"*/{PATTERN}")}):
         yaml = _loaded(files / f"{folder.name}.yaml")
@@ -98,6 +98,7 @@ def _forked(places: Directories) -> int:
     except BaseException:
         logging.exception(pairs("outputs_off_failed", service=places.state.name))
     finally:
+        logging.shutdown()  # writes the last lines
         os._exit(code)
 
 
@@ -106,9 +107,11 @@ def _switched_off(places: Directories) -> int:
     _make_runtime(places)
     act_as_owner(places)
     os.environ |= {"RUNTIME_DIRECTORY": str(places.runtime), "STATE_DIRECTORY": str(places.state)}
-    files = {Path(record.file) for record in map(read, places.state.glob(PATTERN)) if record}
-    told = [argparse.Namespace(file=file, runtime_dir=None, record=[]) for file in sorted(files)]
-    return max(map(dead_daemon.switch_off, told), default=1)
+    files = [record.file for record in map(read, places.state.glob(PATTERN)) if record]
+    if not files:
+        return 1
+    told = argparse.Namespace(file=Path(min(files)), runtime_dir=None, record=[])
+    return dead_daemon.switch_off(told)  # uses the records of the other files too
 
 
 def _make_runtime(places: Directories) -> None:

@@ -10,6 +10,7 @@ import os
 import platform
 import secrets
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -19,11 +20,10 @@ import msgspec
 from bridges import VERSION
 from bridges.blackbox.entries import Head
 from bridges.blackbox.ring import Ring
-from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
-from bridges.runtime import guard, last_mark, order, record, signals
+from bridges.runtime import guard, holder, last_mark, order, record, signals
 from bridges.runtime.diagnostics import CERTIFICATE_FILES, diagnosis
 from bridges.runtime.guard import Guard
 from bridges.runtime.notify import notify, watchdog_s
@@ -43,6 +43,9 @@ log = logging.getLogger(__name__)
 
 STOP_WITHIN_S = 5.0
 STATUS_EVERY_S = 1.0
+NEXT_ORDER_S, SHOWN_S = 3.0, 0.5
+"""The longest time (s) from one person's order to the next, and the time (s) for which the status file
+shows an answer at least. `rmf-bridge` looks for the answer each 0.05 s."""
 ALIVE = "WATCHDOG=1"
 STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
 """A message that asks systemd for 30 more seconds, because a start with many silent devices takes
@@ -77,15 +80,16 @@ class Daemon:
         self._end = end
         self._simulated = simulated
         self._once = Once()
+        ourselves = holder.ourselves(config.path, serves=True)
+        self._process = {"boot": ourselves.boot, "started": ourselves.started}
         self._guard: Guard | None = None
         self._predecessor: Predecessor | None = None
         ours, unsafe = record.of(config), frozenset[str]()
         if config.drives and not simulated:
             self._predecessor = Predecessor(runtime.records, ours, outputs_off)
             unsafe = self._predecessor.make_safe(end.wait)
-        node_name = f"rmf_bridge_{config.path.stem}"
         self._transport = open_transport(
-            config.rmf, node_name, localhost=localhost, ros_args=ros_args
+            config.rmf, config.node, localhost=localhost, ros_args=ros_args
         )
         # A memory of devices gets no second path. Two files could differ, and an old memory of devices
         # is worse than no memory.
@@ -107,7 +111,9 @@ class Daemon:
             self._guard = Guard(outputs_off) if guard.needed() else None
         self._health_topic = named_by(config, DIAGNOSTICS)
         self._told = 0
+        self._given = deque[order.PersonsOrder]()
         self._ordered: order.PersonsOrder | None = None
+        self._next_order_at = 0.0
         self._longest_unfed_s = 0.0
         self._diagnostics: Publisher[DiagnosticArray] | None = None
         if config.rmf.diagnostics:
@@ -137,9 +143,9 @@ class Daemon:
     def serve(self) -> int:
         """Run until a signal comes. Return the exit code, which is 0 only if every output is verified
         off."""
-        signals.on_reset(self._obey)
+        self._orders = signals.Orders()
         self._service.subscribe()
-        self._obey(signalled=False)  # a person's order that came during the start
+        self._given.extend(order.take(self._runtime.path, self._config.path))  # during the start
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
         try:
             for loop in self._loops:
@@ -152,15 +158,16 @@ class Daemon:
             safe = self._shut_down()
         return 0 if safe else 1
 
-    def _obey(self, *, signalled: bool = True) -> None:
-        """Carry out a person's order, which is a file in the runtime directory. If a signal has come
-        but there is no such file, reset every device."""
-        given = order.take(self._runtime.path, self._config.path)
-        if given is None:
-            if signalled:
-                self._service.obey(OperatorReset())
-        else:
-            self._ordered = given
+    def _obey(self) -> None:
+        """Take the orders that a signal has announced, and carry out the oldest order. The next order
+        waits until the status file has the answer, but at most NEXT_ORDER_S."""
+        if self._orders.announced():
+            if not (found := order.take(self._runtime.path, self._config.path)):
+                log.warning(pairs("no_order", reason="a signal came without a readable order"))
+            self._given.extend(found)
+        if self._given and time.monotonic() >= self._next_order_at:
+            given = self._ordered = self._given.popleft()
+            self._next_order_at = time.monotonic() + NEXT_ORDER_S
             log.info(pairs("ordered", what=type(given.event).__name__, order=given.event))
             self._service.obey(given.event, given.device)
 
@@ -170,8 +177,9 @@ class Daemon:
         period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 6)
         told_ready, tell_at = False, 0.0
         fed, fed_at = [-1] * len(self._loops), time.monotonic()
-        while not self._end.wait(0.02 if not told_ready else period_s):
+        while not self._end.wait(0.02 if not told_ready else period_s, self._orders):
             self._require_life()
+            self._obey()
             if not told_ready and all(loop.ready for loop in self._loops):
                 self._convenience("sd_notify", partial(notify, "READY=1"))
                 log.info(pairs("ready", file=self._config.path))
@@ -273,8 +281,11 @@ class Daemon:
             "faults": [*service.get("faults", []), *self._apart()],
         }
         devices = self._service.devices()
-        answer = {"order": self._answer(), "devices": devices}
-        self._runtime.write_status(msgspec.json.encode({**daemon, **answer}))
+        answer = self._answer()
+        answered = {"order": answer, "devices": devices, **self._process}
+        self._runtime.write_status(msgspec.json.encode({**daemon, **answered}))
+        if answer:
+            self._next_order_at = min(self._next_order_at, time.monotonic() + SHOWN_S)
         if self._diagnostics is None:
             return
         try:

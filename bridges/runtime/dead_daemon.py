@@ -8,7 +8,7 @@ for a directory that is full, missing or read-only.
 import argparse
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import msgspec
@@ -20,10 +20,11 @@ from bridges.runtime.record import ClaimRecord, Records
 from bridges.runtime.switch_off import outputs_off
 from bridges.settings.config import Config
 from bridges.system import log
-from bridges.system.directories import Directories, act_as_owner, by_hand, work_somewhere
+from bridges.system.directories import Directories, act_as_owner, by_hand, named, work_somewhere
 from bridges.system.files import read
 from bridges.system.log import pairs
 from bridges.yaml.problems import SettingsError
+from drivers.profiles import texts
 
 TIMEOUT_S = 5.0
 
@@ -31,7 +32,7 @@ TIMEOUT_S = 5.0
 def switch_off(args: argparse.Namespace) -> int:
     """Switch the outputs off. Return 0 if every output is verified off, otherwise 1. Return 69 if the
     daemon may still be alive."""
-    log.start()
+    log.start(unhurried=True)
     signals.ignore()
     file = args.file.absolute()
     try:
@@ -43,10 +44,11 @@ def switch_off(args: argparse.Namespace) -> int:
     if places is None:
         return _off_by_yaml(file, {})
     answered = ages(places)
-    records = Records(places, file)
+    records = Records(places)
     if args.record:  # the daemon that started this process has the lock (`predecessor.py`)
-        return _off_by_records(records, answered, args.record)
-    claimed = last_mark.says_claimed(os.environ) and bool(records.unreleased())
+        return _off_by_records(records, args.record, answered)
+    own = [r.name for r in records.unreleased() if r.file == named(file)]
+    claimed = last_mark.says_claimed(os.environ) and bool(own)
     try:
         held = runtime.RuntimeDirectory(
             places, file, serves=False, wait_s=0.0 if claimed else runtime.WAIT_S
@@ -57,13 +59,11 @@ def switch_off(args: argparse.Namespace) -> int:
                 "%s. The outputs of the earlier run are not verified off, so they are switched off now",
                 error,
             )
-            return _off_by_records(records, answered)
+            return _off_by_records(records, own, answered)
         logging.error("%s. The running program switches the outputs off", error)
         return os.EX_UNAVAILABLE
     try:
-        if held.records.unreleased():
-            return _off_by_records(held.records, answered)
-        return _off_by_yaml(file, answered)
+        return _off_by_all(held.records, file, answered)
     finally:
         held.close()
 
@@ -85,7 +85,23 @@ def _places(file: Path, given: str | None) -> Directories | None:
     return places
 
 
-def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
+def _off_by_all(records: Records, file: Path, answered: Mapping[str, float]) -> int:
+    """Switch off the outputs of all records. If none of them is of this file, switch off the outputs of
+    its YAML too."""
+    found = {record.name: record.file for record in records.unreleased()}
+    others = {name: other for name, other in found.items() if other != named(file)}
+    for name, other in others.items():
+        logging.warning(pairs("record_of_another_file", record=name, file=other))
+    if len(others) < len(found):
+        return _off_by_records(records, found, answered)
+    within_s = TIMEOUT_S / (len(found) + 1)
+    code = _off_by_records(records, found, answered, within_s)
+    texts.give({})  # a record's profiles are not those of the YAML
+    by_yaml = _off_by_yaml(file, answered, within_s)
+    return code or by_yaml
+
+
+def _off_by_yaml(file: Path, answered: Mapping[str, float], within_s: float = TIMEOUT_S) -> int:
     from bridges.settings.load import load
 
     try:
@@ -96,16 +112,19 @@ def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
     if not config.drives:
         logging.info(pairs("nothing_to_switch_off", file=file, kind=config.kind))
         return 0
-    return _told(_unsafe(config, (), answered, TIMEOUT_S) == set())
+    return _told(_unsafe(config, (), answered, within_s) == set())
 
 
 def _off_by_records(
-    records: Records, answered: Mapping[str, float], names: list[str] | None = None
+    records: Records,
+    names: Collection[str],
+    answered: Mapping[str, float],
+    each_s: float | None = None,
 ) -> int:
-    """Switch off the outputs of the records in `names`. If `names` is None, switch off the outputs of
-    all records."""
-    found = [r for r in records.unreleased() if names is None or r.name in names]
-    each_s = TIMEOUT_S / max(1, len(found))  # so one dead bus leaves time for others
+    """Switch off the outputs of the records in `names`. Each record has `each_s` (s), or an equal part
+    of TIMEOUT_S."""
+    found = [r for r in records.unreleased() if r.name in names]
+    each_s = each_s or TIMEOUT_S / max(1, len(found))  # so one dead bus leaves time for others
     return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
 
 

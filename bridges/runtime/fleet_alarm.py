@@ -6,6 +6,7 @@ of a device. The alarm's memory is written to disk before a message is published
 """
 
 import logging
+import math
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Final
@@ -112,6 +113,7 @@ class FleetAlarmNode(
         self._tells_nobody = tells_nobody
         self._renew_at = NEVER
         self._untold = False
+        self._twin_at = -math.inf
         self._counted = 0
         self._unnamed: dict[str, tuple[Sender | None, str]] = {}
         super().__init__(
@@ -184,7 +186,13 @@ class FleetAlarmNode(
     def _faults(self) -> tuple[Fault, ...]:
         decision = self.subjects[ALARM].decision
         found = decision.report.faults if decision else ()
-        return *found, *super()._faults(), *self._not_told()
+        return *found, *super()._faults(), *self._not_told(), *self._twin()
+
+    def _twin(self) -> tuple[Fault, ...]:
+        if self._clock.monotonic() - self._twin_at > QUIET_S:
+            return ()
+        text = f"another daemon is {self._transport.name} too: neither hears the other one's alarm"
+        return (Fault("TWO_NODES_OF_ONE_NAME", text),)
 
     def _not_told(self) -> tuple[Fault, ...]:
         if not self._untold:
@@ -241,7 +249,11 @@ class FleetAlarmNode(
 
     def _on_statement(self, message: DiagnosticArray) -> None:
         for event in alarming.stated(message):
-            if event.node != self._transport.name:
+            if event.node == self._transport.name:  # not ours, because of `others_only`
+                if not self._twin():
+                    log.error(pairs("two_nodes_of_one_name", node=event.node))
+                self._twin_at = self._clock.monotonic()
+            else:
                 self.inbox.put(ALARM, (DIAGNOSTICS, event), ("stated", event.node))
 
 

@@ -54,10 +54,13 @@ class LockHolder(msgspec.Struct, frozen=True):
 
 
 class _Shown(msgspec.Struct):
-    """The daemon's process according to a status file."""
+    """The daemon's process according to a status file. An older version does not write `boot` and
+    `started`."""
 
     pid: int = 0
     file: str = ""
+    boot: str = ""
+    started: int = 0
 
 
 def ourselves(file: Path, *, serves: bool) -> LockHolder:
@@ -90,7 +93,8 @@ def written(folder: Path) -> LockHolder | None:
 
 
 def shown(places: Directories) -> LockHolder | None:
-    """Return the living daemon that a fresh status file names, or None.
+    """Return the living daemon that a fresh status file names, or None. This process does not count,
+    because a dead daemon may have had its pid, as in a container that starts again.
 
     This also finds a daemon without a `holder.json`. Such a daemon could not write that file, or has an
     older version.
@@ -99,8 +103,10 @@ def shown(places: Directories) -> LockHolder | None:
     with suppress(OSError, msgspec.MsgspecError, UnicodeDecodeError), opened(places.runtime):
         fresh = abs(time.time() - path.lstat().st_mtime) < FRESH_S
         found = msgspec.json.decode(read(path, STATUS_MAX), type=_Shown)
-        if fresh and _is_there(found.pid):
-            return LockHolder(found.pid, found.file, True)
+        one = LockHolder(found.pid, found.file, True, found.boot, found.started)
+        lives = one.lives if one.started else _is_there(one.pid)
+        if fresh and lives and one.pid != os.getpid():
+            return one
     return None
 
 

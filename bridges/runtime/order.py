@@ -1,8 +1,9 @@
 """A person's order to a running daemon: a reset, a drill, or a decision about a workcell's requests.
 
-The order is a file in the runtime directory, and a signal tells the daemon to read the file. The file
-names the daemon's process, so that a daemon that starts later does not obey the order. A signal without
-a file is a reset. When every device has decided about the order, the daemon answers in its status file.
+Each order is a file of its own in the runtime directory, and a signal tells the daemon to read the
+files. A file names the daemon's process, so that a daemon that starts later does not obey the order. A
+signal without a readable order does nothing. When every device has decided about the order, the daemon
+answers in its status file.
 """
 
 import json
@@ -25,7 +26,7 @@ from bridges.kinds.shared.decision import (
     OrderedByPerson,
 )
 from bridges.runtime import holder
-from bridges.runtime.holder import STATUS, STATUS_MAX
+from bridges.runtime.holder import STATUS, STATUS_MAX, LockHolder
 from bridges.runtime.runtime_directory import find
 from bridges.runtime.signals import RESET
 from bridges.system import files
@@ -34,7 +35,8 @@ from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
 
-ORDER: Final = "order.json"
+ORDERS: Final = "order-*.json"
+"""The files of orders. Their names sort by the time at which the orders were given."""
 LONGEST: Final = 65536
 ANSWERS_WITHIN_S: Final = 10.0
 """The time (s) for which the command waits for the daemon's answer. It is long enough, because the
@@ -50,16 +52,22 @@ class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     - `device`: the device that must obey, or "" for every device
     - `id`: the name of the order in the daemon's answer
-    - `verdict`, `drill_s` (s): the decision, or the duration of the drill. Without both, the order is a
-      reset.
+    - `reset`, `verdict`, `drill_s` (s): a reset, a decision, or the duration of a drill. An order says
+      exactly one of these.
     """
 
     pid: int
     started: int
     id: str
     device: str = ""
+    reset: bool = False
     verdict: DecidedByPerson | None = None
     drill_s: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ValueError unless the order says exactly one thing."""
+        if self.reset + (self.verdict is not None) + (self.drill_s is not None) != 1:
+            raise ValueError("an order is a reset, a decision or a drill")
 
     @property
     def event(self) -> OrderedByPerson:
@@ -104,15 +112,23 @@ def give(file: Path, places: Directories, **order: Any) -> int:
         )
         print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
         return 1
-    given = PersonsOrder(found.pid, found.started, secrets.token_hex(8), **order)
-    with opened(places.runtime):
-        files.replace(places.runtime / ORDER, msgspec.json.encode(given))
     try:
-        os.kill(found.pid, RESET)
+        given = send(found, places, **order)
     except ProcessLookupError:
         print(f"the daemon of {file} has just ended", file=sys.stderr)
         return 1
     return _wait(file, places, given)
+
+
+def send(daemon: LockHolder, places: Directories, **order: Any) -> PersonsOrder:
+    """Give an order to this daemon, and do not wait for the answer. Raises ProcessLookupError if the
+    daemon has ended, and other OSErrors."""
+    given = PersonsOrder(daemon.pid, daemon.started, secrets.token_hex(8), **order)
+    name = ORDERS.replace("*", f"{time.monotonic_ns():020}-{given.id}")
+    with opened(places.runtime):
+        files.replace(places.runtime / name, msgspec.json.encode(given))
+    os.kill(daemon.pid, RESET)
+    return given
 
 
 def _wait(file: Path, places: Directories, given: PersonsOrder) -> int:
@@ -141,20 +157,29 @@ def status_of(places: Directories) -> Mapping[str, Any] | None:
     return status if daemon is not None and status.get("pid") == daemon.pid else None
 
 
-def take(runtime: Path, file: Path) -> PersonsOrder | None:
-    """Return the order that waits for this process, and remove it. Return None if there is none. Does
-    not raise."""
-    path, ours = runtime / ORDER, holder.ourselves(file, serves=True)
+def take(runtime: Path, file: Path) -> list[PersonsOrder]:
+    """Return the orders that wait for this process, the oldest first, and remove them. Log and remove
+    unreadable orders, and orders to another process. Does not raise."""
+    ours, found = holder.ourselves(file, serves=True), list[PersonsOrder]()
     try:
         with opened(runtime):
-            order = msgspec.json.decode(files.read(path, LONGEST), type=PersonsOrder)
-    except FileNotFoundError:
-        return None
-    except (OSError, msgspec.MsgspecError, UnicodeDecodeError) as error:
+            for path in sorted(runtime.glob(ORDERS)):
+                if order := _taken(path, ours):
+                    found.append(order)
+    except OSError as error:
+        log.error(pairs("order_not_read", file=runtime, reason=error))
+    return found
+
+
+def _taken(path: Path, ours: LockHolder) -> PersonsOrder | None:
+    try:
+        order = msgspec.json.decode(files.read(path, LONGEST), type=PersonsOrder)
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         log.error(pairs("order_not_read", file=path, reason=error))
         order = None
     with suppress(OSError):
         path.unlink(missing_ok=True)
-    if order is None or (order.pid, order.started) != (ours.pid, ours.started):
+    if order and (order.pid, order.started) != (ours.pid, ours.started):
+        log.warning(pairs("order_for_another_process", file=path, pid=order.pid))
         return None
     return order

@@ -141,20 +141,23 @@ class _OwnDriver(msgspec.Struct):
 
 
 class Records:
-    """The records of one file in a daemon's directories."""
+    """The records in a daemon's directories.
 
-    def __init__(self, places: Directories, file: Path) -> None:
+    A record of another file counts too. It is there if the YAML's path was a link that now leads
+    elsewhere, or if another YAML with the same name had this directory.
+    """
+
+    def __init__(self, places: Directories) -> None:
         self._places = places
-        self._file = named(file)
 
     def unreleased(self) -> list[ClaimRecord]:
-        """Return this file's records whose outputs are not all off. Log unreadable records, and leave
-        them out."""
+        """Return the records whose outputs are not all off. Log unreadable records, and leave them
+        out."""
         by_name = dict[str, ClaimRecord]()
         for path in paths(self._places):
             if (record := read(path)) is None:
                 log.warning(pairs("record_not_read", path=path))
-            elif record.file == self._file:
+            else:
                 by_name[record.name] = record
         return list(by_name.values())
 

@@ -180,7 +180,7 @@ class RuntimeDirectory:
         """
         self.places = places
         self.path = places.runtime
-        self.records = Records(places, file)
+        self.records = Records(places)
         self._holder = holder.ourselves(file, serves=serves)
         self._locks: dict[Path, int] = {}
         self._record: ClaimRecord | None = None

@@ -11,7 +11,6 @@ a daemon. SIGKILL and SIGSTOP cannot be caught.
 import os
 import select
 import signal
-from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
 from typing import Final
@@ -53,9 +52,11 @@ class End:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._on_signal)
 
-    def wait(self, timeout_s: float) -> bool:
-        """Wait up to `timeout_s` (s). Return True after a signal."""
-        return bool(select.select([self._read], [], [], timeout_s)[0])
+    def wait(self, timeout_s: float, orders: "Orders | None" = None) -> bool:
+        """Wait up to `timeout_s` (s). Return True after a signal. An order in `orders` ends the wait
+        early, and the result is then False."""
+        watched = [self._read, *([orders.read] if orders else [])]
+        return self._read in select.select(watched, [], [], timeout_s)[0]
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         for each in TERMINAL:  # in the background, a log line would raise these signals again
@@ -64,9 +65,31 @@ class End:
             os.write(self._write, b".")
 
 
-def on_reset(reset: Callable[[], None]) -> None:
-    """Call `reset` at the signal that announces a person's order (`bridges/runtime/order.py`)."""
-    signal.signal(RESET, lambda number, frame: reset())
+class Orders:
+    """The signal RESET, which announces a person's order (`bridges/runtime/order.py`).
+
+    The handler only notes the signal, because a second signal may interrupt the handler, and any lock
+    may be held. `read` is a pipe's end that becomes readable after a signal.
+    """
+
+    def __init__(self) -> None:
+        """Begin to catch the signal."""
+        self.read, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self._announced = False
+        signal.signal(RESET, self._on_signal)
+
+    def announced(self) -> bool:
+        """Return whether a signal has come since the last call."""
+        if not self._announced:
+            return False
+        os.read(self.read, 1)
+        self._announced = False  # before the caller looks for orders, so that none is missed
+        return True
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if not self._announced:
+            self._announced = True
+            os.write(self._write, b".")
 
 
 def ignore() -> None:

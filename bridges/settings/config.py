@@ -1,5 +1,6 @@
 """A valid device YAML, as the daemon and `check` use it."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -50,6 +51,12 @@ class Config(Struct, frozen=True):
     notes: tuple[Problem, ...] = ()
     section: Any = None
     recording: RecordingSettings = RecordingSettings()
+
+    @property
+    def node(self) -> str:
+        """The name of the daemon's node. It is made of the file's name, because a ROS name has only
+        ASCII letters, digits and underscores."""
+        return re.sub(r"\W", "_", f"rmf_bridge_{self.path.stem}", flags=re.ASCII)
 
     @property
     def drives(self) -> bool:

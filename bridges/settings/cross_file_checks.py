@@ -61,12 +61,28 @@ def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
 
 def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
     """Yield a problem for each thing that two files use, although only one file may use it. Such things
-    are ports, pins, points of a unit and RMF names."""
+    are ports, pins, points of a unit, RMF names and names of nodes."""
     lines = list(_twice(c for config in configs for c in _lines(config, one_machine)))
     busy = {claim.what for claim, _ in lines}
     claims = (c for config in configs for c in _claims(config, one_machine))
     rest = (c for c in claims if not any(c.what.endswith(f" of {b}") for b in busy))
     yield from map(_taken, (*lines, *_twice(rest)))
+    yield from map(_one_node, _twice(_nodes(configs, one_machine)))
+
+
+def _nodes(configs: Sequence[Config], one_machine: bool) -> Iterator[ExclusiveUse]:
+    """Yield the name of each daemon's node. Daemons of several machines meet only on a network."""
+    for config in configs:
+        if one_machine or config.rmf.network != "localhost":
+            yield ExclusiveUse(config, config.node, ("kind",))
+
+
+def _one_node(pair: tuple[ExclusiveUse, ExclusiveUse]) -> Problem:
+    claim, other = pair
+    return claim.problem(
+        f"the node '{claim.what}' is that of {other.config.path} too: rename one of the two files,"
+        " because daemons with one node name do not hear each other's alarm"
+    )
 
 
 def shared_secrets(configs: Sequence[Config]) -> Iterator[Problem]:

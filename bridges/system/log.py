@@ -4,11 +4,16 @@ import codecs
 import logging
 import os
 import re
+import select
 import sys
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Set
+from contextlib import suppress
 from datetime import UTC, datetime
 from enum import Enum
+from typing import Final
 
 import msgspec
 
@@ -186,9 +191,92 @@ class _Run(msgspec.Struct):
     left_out: int = 0
 
 
-def start(level: str = "INFO", *, json: bool = False) -> None:
-    """Send every log line to stderr, as text or as JSON."""
-    to_stderr = logging.StreamHandler(sys.stderr)
+class Unhurried(logging.Handler):
+    """A handler that never lets a caller wait. One thread of its own writes the lines to the file
+    descriptor `to`.
+
+    If nobody reads the log (Ctrl-S, a full pipe), lines wait up to MOST bytes. Further lines are
+    dropped, and their number is logged when a reader reads again. The thread starts with the first
+    line, also in a forked child.
+    """
+
+    MOST: Final = 256 << 10
+    FLUSHED_WITHIN_S: Final = 1.0
+    """The longest wait (s) for a reader at the process's end."""
+
+    def __init__(self, to: int) -> None:
+        super().__init__()
+        self._to = to
+        self._begin()
+        os.register_at_fork(after_in_child=self._begin)
+
+    def _begin(self) -> None:
+        self._changed = threading.Condition()
+        self._lines = deque[bytes]()
+        self._size = self._dropped = 0
+        self._thread: threading.Thread | None = None
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Queue a line, or drop and count it."""
+        try:
+            self._put(self._encoded(record))
+        except Exception:  # noqa: BLE001 - as logging.StreamHandler
+            self.handleError(record)
+
+    def flush(self) -> None:
+        """Wait until all lines are written, but not longer than FLUSHED_WITHIN_S."""
+        with self._changed:
+            self._changed.wait_for(lambda: not self._size, self.FLUSHED_WITHIN_S)
+
+    def _encoded(self, record: logging.LogRecord) -> bytes:
+        return (self.format(record) + "\n").encode(errors="backslashreplace")
+
+    def _put(self, line: bytes) -> None:
+        with self._changed:
+            if self._size and self._size + len(line) > self.MOST:
+                self._dropped += 1
+                return
+            self._append(line)
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._write, name="log", daemon=True)
+                self._thread.start()
+            self._changed.notify_all()
+
+    def _append(self, line: bytes) -> None:
+        self._lines.append(line)
+        self._size += len(line)
+
+    def _write(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._lines)
+                line = self._lines.popleft()
+            with suppress(OSError):  # the reader has ended, or the disk is full
+                _write_all(self._to, line)
+            with self._changed:
+                self._size -= len(line)
+                if self._dropped and not self._lines:  # the dropped lines were the later ones
+                    self._append(self._told())
+                self._changed.notify_all()
+
+    def _told(self) -> bytes:
+        text, self._dropped = pairs("log_not_read", dropped=self._dropped), 0
+        return self._encoded(logging.makeLogRecord({"levelname": "WARNING", "msg": text}))
+
+
+def _write_all(to: int, line: bytes) -> None:
+    while line:
+        select.select([], [to], [])  # needed if another process made the descriptor non-blocking
+        line = line[os.write(to, line) :]
+
+
+def start(level: str = "INFO", *, json: bool = False, unhurried: bool = False) -> None:
+    """Send every log line to stderr, as text or as JSON. `unhurried`: no thread waits for the log's
+    reader, because this process drives outputs."""
+    to_stderr: logging.Handler = logging.StreamHandler(sys.stderr)
+    if unhurried:
+        with suppress(OSError, AttributeError):  # stderr is closed, or is no file
+            to_stderr = Unhurried(sys.stderr.fileno())
     journal = "JOURNAL_STREAM" in os.environ
     to_stderr.setFormatter(_Json(journal) if json else _Formatter(journal))
     to_stderr.addFilter(_OthersOnce())

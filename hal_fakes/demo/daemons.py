@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from bridges.runtime import holder, order
+from bridges.system.directories import Directories
 from hal_fakes.caller import Caller, SimulationRefused
 from hal_fakes.plants.plant import Edge
 from hal_fakes.wire import wire
@@ -104,8 +106,9 @@ class DaemonProcess(Program):
 
     def reset(self) -> None:
         """Reset the daemon as `rmf-bridge reset` does."""
-        if not self._exited():
-            os.kill(self._process.pid, signal.SIGUSR1)
+        places = Directories(self.runtime_dir, self.runtime_dir)
+        if not self._exited() and (daemon := holder.look(places)):
+            order.send(daemon, places, reset=True)
 
     def _caller(self) -> Caller:
         path, deadline = self.runtime_dir / "plant.sock", time.monotonic() + CONNECT_WITHIN_S

@@ -172,7 +172,7 @@ def test_outputs_that_nobody_has_verified_off_are_reported_even_without_a_status
     with served(tmp_path / "lift_a", lift()) as folder:
         (folder / "status.json").unlink()
     config = load(ROOT / "config" / "door_modbus.yaml")
-    record = Records(Directories(folder, folder), config.path).write(of(config))
+    record = Records(Directories(folder, folder)).write(of(config))
     found = seen(folder)
     assert [(one.state, one.level) for one in found] == [("left on", DOWN)]
     head, remedy = shown(found)

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import msgspec
@@ -21,6 +22,7 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.messages.definitions import DoorModeValue
+from bridges.runtime import order
 from bridges.runtime.holder import HOLDER, ourselves
 from bridges.runtime.signals import ENDING, WRITES
 from hal_fakes.wire import wire
@@ -66,6 +68,15 @@ def module(wall: tuple[Module, Graph]) -> Module:
     standing.edges.clear()
     joined.states.clear()
     return standing
+
+
+def fill(pipe: int) -> None:
+    """Fill a pipe that nobody reads."""
+    os.set_blocking(pipe, False)
+    with suppress(BlockingIOError):
+        while os.write(pipe, b"x"):
+            pass
+    os.set_blocking(pipe, True)
 
 
 def _off(module: Module) -> None:
@@ -134,10 +145,75 @@ def test_signals_that_end_nothing_by_default_or_only_a_write_leave_the_door_held
 ) -> None:
     with daemon(module.file, tmp_path / "run", **SERVICE) as running:
         hold_open(module, graph, running)
-        for number in (signal.SIGWINCH, signal.SIGCHLD, signal.SIGCONT, signal.SIGUSR1, *WRITES):
+        usr1s = [signal.SIGUSR1] * 2000
+        for number in (signal.SIGWINCH, signal.SIGCHLD, signal.SIGCONT, *usr1s, *WRITES):
             running.process.send_signal(number)
         _states_go_on(graph)
         assert module.relay() == [True]
+        running.wait_for("no_order")
+        assert "ordered what=" not in running.log.read_text()
+
+
+def test_orders_of_several_people_at_one_time_are_all_obeyed_and_answered(
+    module: Module, tmp_path: Path
+) -> None:
+    with daemon(module.file, tmp_path / "run", **SERVICE) as running:
+        running.wait_for("ready")
+        drill = command("drill", "--end", module.file, "--runtime-dir", tmp_path / "run")
+        people = [subprocess.Popen(drill, env=environment()) for _ in range(3)]
+        assert [one.wait(PATIENCE_S) for one in people] == [order.REFUSED] * 3
+        said = running.log.read_text()
+    assert (said.count("ordered what="), said.count("ordered what=DrillOrdered")) == (3, 3)
+
+
+def test_an_unread_log_delays_neither_a_request_nor_the_end_nor_outputs_off(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    """The reader of the log has stopped reading, as after Ctrl-S or with a log shipper that hangs."""
+    run, (read, unread), heard = tmp_path / "run", os.pipe(), b""
+    processes = ExitStack()
+
+    def started(word: str) -> "subprocess.Popen[bytes]":
+        process = subprocess.Popen(
+            command(word, module.file, "--runtime-dir", run),
+            env=environment(**SERVICE),
+            stderr=unread,
+        )
+        processes.callback(process.kill)
+        return process
+
+    def asked(mode: DoorModeValue, relay: bool) -> None:
+        def done() -> bool:
+            graph.ask(mode)
+            return module.relay()[-1:] == [relay]
+
+        wait_until(done, f"the relay is {relay}")
+
+    with processes:
+        for end in (signal.SIGTERM, signal.SIGKILL):
+            running = started("run")
+            while b" ready " not in heard:
+                heard += os.read(read, 4096)
+            fill(unread)
+            for mode, relay in (
+                (DoorModeValue.MODE_OPEN, True),
+                (DoorModeValue.MODE_CLOSED, False),
+            ):
+                asked(mode, relay)
+            asked(DoorModeValue.MODE_OPEN, True)
+            running.send_signal(end)
+            assert running.wait(PATIENCE_S) == (0 if end is signal.SIGTERM else -end)
+            if end is signal.SIGKILL:
+                assert started("outputs-off").wait(PATIENCE_S) == 0
+            _off(module)
+            os.set_blocking(read, False)
+            with suppress(BlockingIOError):
+                while os.read(read, 65536):
+                    pass
+            os.set_blocking(read, True)
+            heard = b""
+    os.close(read)
+    os.close(unread)
 
 
 def test_a_closed_terminal_releases_the_relay(module: Module, graph: Graph, tmp_path: Path) -> None:
@@ -175,6 +251,49 @@ def test_a_daemon_by_hand_that_is_killed_has_a_guard_that_switches_off(
         _off(module)
     wait_until(lambda: not _alive(guard), "the guard has ended")
     assert [path.name for path in (tmp_path / "run").glob("claimed-*")] == []
+
+
+def test_the_guard_of_a_relative_path_uses_the_record_and_not_the_edited_file(
+    module: Module, graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(module.directory)
+    with daemon(Path(module.file.name), tmp_path / "run") as running:
+        hold_open(module, graph, running)
+        module.file.write_text(module.yaml.replace("coil 0", "coil 5"))
+        running.end(signal.SIGKILL)
+        _off(module)
+        wait_until(lambda: not [*(tmp_path / "run").glob("claimed-*")], "the record is removed")
+
+
+def test_the_guard_of_a_link_uses_the_record_though_the_link_leads_to_another_file_now(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    link, new = tmp_path / "ward_door.yaml", tmp_path / "new.yaml"
+    link.symlink_to(module.file)
+    new.write_text(module.yaml.replace("ward_door", "other_door"))
+    with daemon(link, tmp_path / "run") as running:
+        hold_open(module, graph, running)
+        link.unlink()
+        link.symlink_to(new)
+        running.end(signal.SIGKILL)
+        _off(module)
+        wait_until(lambda: not [*(tmp_path / "run").glob("claimed-*")], "the record is removed")
+        assert "record_of_another_file" in running.log.read_text()
+
+
+def test_another_file_in_one_directory_switches_a_daemons_outputs_off_only_after_its_death(
+    module: Module, graph: Graph, tmp_path: Path
+) -> None:
+    other = tmp_path / "other.yaml"
+    other.write_text(module.yaml.replace("ward_door", "other_door"))
+    off = ("outputs-off", other, "--runtime-dir", tmp_path / "run")
+    with daemon(module.file, tmp_path / "run", **SERVICE) as running:
+        hold_open(module, graph, running)
+        assert (_told(*off).returncode, module.relay()) == (os.EX_UNAVAILABLE, [True])
+        running.end(signal.SIGKILL)
+    done = _told(*off)
+    assert (done.returncode, done.stderr.count("outputs_off device=")) == (0, 2), done.stderr
+    _off(module)
 
 
 def test_the_guard_tries_until_hardware_that_was_silent_at_the_death_answers(

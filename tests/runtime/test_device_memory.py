@@ -1,7 +1,6 @@
 """The file in which a daemon keeps the memories of its devices. Also a person's order about a
 device."""
 
-import os
 from pathlib import Path
 
 import msgspec
@@ -9,7 +8,13 @@ import pytest
 
 from bridges.kinds.dispenser import keep
 from bridges.kinds.dispenser.memory import Job, WorkcellMemory
-from bridges.kinds.shared.decision import DecidedByPerson, MemoryKept, MemoryNotKept
+from bridges.kinds.shared.decision import (
+    DecidedByPerson,
+    DrillOrdered,
+    MemoryKept,
+    MemoryNotKept,
+    OperatorReset,
+)
 from bridges.runtime import holder, order
 from bridges.runtime.device_memory import NO_FILE, AlarmMemory, DeviceKeeper, DeviceMemories
 from bridges.runtime.runtime_directory import MemoryFile
@@ -77,25 +82,49 @@ def test_a_failed_write_is_repeated_each_second_and_only_changes_are_written() -
     assert [keeper.keep(QUEUED, at) for at in (2.0, 2.4, 2.5)] == [None, MemoryKept(), None]
 
 
-@pytest.mark.parametrize("shift", [0, 1])
-def test_an_order_is_obeyed_by_the_process_that_it_names_and_by_no_other(
-    tmp_path: Path, shift: int
+def _left(folder: Path, number: int, **fields: object) -> Path:
+    """Write an order to this process, with these fields more. Return its path."""
+    ours = holder.ourselves(folder / "x.yaml", serves=True)
+    path = folder / order.ORDERS.replace("*", str(number))
+    order_ = {"pid": ours.pid, "started": ours.started, "id": str(number)} | fields
+    path.write_bytes(msgspec.json.encode(order_))
+    return path
+
+
+def _taken(folder: Path) -> list[str]:
+    folder.chmod(0o700)
+    found = [f"{one.id} {one.event}" for one in order.take(folder, folder / "x.yaml")]
+    assert list(folder.glob(order.ORDERS)) == []
+    return found
+
+
+def test_every_order_is_taken_once_and_the_oldest_first(tmp_path: Path) -> None:
+    _left(tmp_path, 2, verdict={"verdict": "again", "request": "guid"}, device="store")
+    _left(tmp_path, 3, reset=True)
+    _left(tmp_path, 1, drill_s=0.0)
+    told = [DrillOrdered(0.0), DecidedByPerson("again", "guid"), OperatorReset()]
+    assert _taken(tmp_path) == [f"{at} {event}" for at, event in enumerate(told, start=1)]
+    assert _taken(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"drill_s": 0.0, "of_a_later_version": 1},
+        {"drill_s": 0.0, "reset": True},
+        {"reset": True, "started": 1},
+    ],
+    ids=["says nothing", "later version", "says two things", "to another process"],
+)
+def test_an_order_that_is_not_to_us_or_not_understood_is_logged_and_is_no_order(
+    tmp_path: Path, fields: dict[str, object], caplog: pytest.LogCaptureFixture
 ) -> None:
-    tmp_path.chmod(0o700)
-    ours = holder.ourselves(tmp_path / "x.yaml", serves=True)
-    verdict = DecidedByPerson("again", "guid")
-    started = ours.started + shift
-    given = order.PersonsOrder(os.getpid(), started, "1", "store", verdict)
-    path = tmp_path / order.ORDER
-    path.write_bytes(msgspec.json.encode(given))
-    assert order.take(tmp_path, tmp_path / "x.yaml") == (None if shift else given)
-    assert not path.exists()
-    assert order.take(tmp_path, tmp_path / "x.yaml") is None
+    path = _left(tmp_path, 1, **fields)
+    assert _taken(tmp_path) == []
+    assert str(path) in caplog.text
 
 
 def test_a_damaged_order_is_no_order(tmp_path: Path) -> None:
-    tmp_path.chmod(0o700)
-    path = tmp_path / order.ORDER
-    path.write_bytes(b"{")
-    assert order.take(tmp_path, tmp_path / "x.yaml") is None
-    assert not path.exists()
+    _left(tmp_path, 1).write_bytes(b"{")
+    assert _taken(tmp_path) == []

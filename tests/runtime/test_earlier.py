@@ -40,7 +40,7 @@ def left(folder: Path, **later: object) -> tuple[Path, Records, str]:
     content = msgspec.json.decode(source.read_bytes()) | later
     path = folder / source.name
     path.write_bytes(msgspec.json.encode(content))
-    return path, Records(Directories(folder, folder), Path(content["file"])), content["file"]
+    return path, Records(Directories(folder, folder)), content["file"]
 
 
 @pytest.mark.parametrize("folder", EARLIER, ids=lambda folder: folder.name)

@@ -218,3 +218,20 @@ def test_named_fleets_are_told_on_their_topic() -> None:
     site.resets("a")
     told = [d.EmergencySignal(("x", "y"), on) for on in (True, False)]
     assert (heard, site.heard) == (told, [])
+
+
+def test_a_second_daemon_with_our_node_name_is_a_fault_as_long_as_it_is_there() -> None:
+    """Neither daemon hears the other one's alarm, because each takes it for its own earlier one."""
+    site = Site()
+    site.start("a")
+    one = site.nodes.pop("a")
+    ours = site.transports.pop("a")
+    site.start("a")
+    site.until(4.0)
+    twin, site.nodes["a"] = site.nodes["a"], one
+    assert site.state("a") == "quiet TWO_NODES_OF_ONE_NAME"
+    site.nodes["a"] = twin
+    site.kill("a")
+    site.nodes["a"], site.transports["a"] = one, ours
+    site.until(8.0)
+    assert site.state("a") == "quiet"

@@ -103,7 +103,7 @@ def test_a_start_has_another_process_switch_off_its_own_devices_unless_one_just_
     places.runtime.mkdir()
     config = load(CONFIG / "door_register.yaml")
     ours = record.of(config)
-    records = Records(places, config.path)
+    records = Records(places)
     records.write(ours)
     if tried:
         records.still_unsafe(ours, config.devices, config)

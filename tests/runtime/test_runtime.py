@@ -119,12 +119,12 @@ def test_a_daemon_on_another_yaml_overwrites_no_unreleased_claim(tmp_path: Path)
     second.close()
 
 
-def test_a_record_counts_only_for_the_file_that_it_names(tmp_path: Path) -> None:
+def test_a_record_of_another_file_with_the_same_directory_counts_too(tmp_path: Path) -> None:
     first = held(tmp_path)
     first.claim(CLAIMED)
     first.close()
     other = held(tmp_path, file=Path("/home/pi/lift.yaml"))
-    assert other.records.unreleased() == []
+    assert other.records.unreleased() == [CLAIMED]
     other.close()
 
 
@@ -304,6 +304,18 @@ def test_a_daemon_whose_version_has_another_lock_is_known_by_its_fresh_status(
         os.utime(told)
         other.kill()
     held(tmp_path).close()
+
+
+def test_a_dead_daemon_whose_pid_is_in_use_again_does_not_stop_a_start(tmp_path: Path) -> None:
+    """A container starts again at once, and gives the same pids."""
+    told = tmp_path / "status.json"
+    told.write_text(json.dumps({"pid": os.getpid(), "file": str(FILE)}))
+    held(tmp_path).close()
+    with subprocess.Popen(["sleep", "60"]) as other:
+        of_dead = {"pid": other.pid, "file": str(FILE), "boot": OURS.boot, "started": 1}
+        told.write_text(json.dumps(of_dead))
+        held(tmp_path).close()
+        other.kill()
 
 
 def test_only_its_user_can_open_the_lock_and_its_group_can_read_who_holds_it(

@@ -92,7 +92,7 @@ def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
     """After TimeoutStopSec systemd kills ExecStopPost. So `outputs-off` must divide its time among the
     records, and must reach the last record in time."""
     file, given = tmp_path / "lift.yaml", list[float]()
-    claims = Records(Directories(tmp_path, tmp_path), file)
+    claims = Records(Directories(tmp_path, tmp_path))
     for name in ("lift_dry_contact", "lift_relay_board", "lift_one_hot"):
         config = load(ROOT / "config" / f"{name}.yaml")
         claims.write(replace(record.of(config), file=str(file)))
@@ -102,6 +102,6 @@ def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
         return set()
 
     monkeypatch.setattr(dead_daemon, "outputs_off", silent)
-    assert dead_daemon._off_by_records(claims, {}) == 1
+    assert dead_daemon._off_by_all(claims, file, {}) == 1
     assert len(given) == 3
     assert sum(given) == pytest.approx(dead_daemon.TIMEOUT_S)

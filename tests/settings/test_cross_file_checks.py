@@ -97,6 +97,35 @@ def test_a_shared_pin_is_found_in_any_spelling(capsys: pytest.CaptureFixture[str
     assert said(capsys, GPIO, second, "--several-machines") == (0, [])
 
 
+@pytest.mark.parametrize(
+    ("second", "options", "network", "refused"),
+    [
+        ("two/tür.yaml", ["--several-machines"], "subnet", True),
+        ("two/tor.yaml", ["--several-machines"], "subnet", False),
+        ("two/tör.yaml", [], "localhost", True),
+        ("two/tür.yaml", ["--several-machines"], "localhost", False),
+    ],
+)
+def test_two_files_whose_nodes_have_one_name_are_an_error_if_they_share_a_graph(
+    capsys: pytest.CaptureFixture[str],
+    second: str,
+    options: list[str],
+    network: str,
+    refused: bool,
+) -> None:
+    for folder, text in (("one", DOOR), ("two", SECOND.replace("168.1.50", "168.1.51"))):
+        Path(folder).mkdir()
+        file = Path("one/tür.yaml") if folder == "one" else Path(second)
+        file.write_text(text.replace("rmf: {", f"rmf: {{network: {network}, "))
+    code = main(["check", "one/tür.yaml", second, *options])
+    lines = [
+        f"{second}:1:7: the node 'rmf_bridge_t_r' is that of one/tür.yaml too: rename one of the two"
+        " files, because daemons with one node name do not hear each other's alarm",
+        "1 error",
+    ]
+    assert (code, capsys.readouterr().err.splitlines()) == ((78, lines) if refused else (0, []))
+
+
 def test_different_domains_are_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     second = SECOND.replace("192.168.1.50", "192.168.1.51")
     assert said(capsys, DOOR, second.replace("domain_id: 3", "domain_id: 4")) == (

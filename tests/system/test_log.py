@@ -2,6 +2,8 @@
 
 import json
 import logging
+import os
+import weakref
 from datetime import datetime
 
 import pytest
@@ -11,7 +13,7 @@ from bridges.kinds.door.signals import DoorOutputs
 from bridges.kinds.lift.signals import LiftOutputs, Side
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages.definitions import LiftMode
-from bridges.system.log import Seldom, _Formatter, _Json, _OthersOnce, pairs, plain
+from bridges.system.log import Seldom, Unhurried, _Formatter, _Json, _OthersOnce, pairs, plain
 
 
 class Asked(Struct, frozen=True):
@@ -123,3 +125,36 @@ def test_a_library_line_has_keys_and_comes_once() -> None:
     assert [once.filter(line) for line in lines] == [True, False, True]
     assert lines[0].getMessage() == 'library logger=paho.mqtt text="bad\\x1b frame"'
     assert json.loads(_Json(journal=False).format(lines[0]))["event"] == "library"
+
+
+def test_an_unread_log_makes_nobody_wait_and_the_dropped_lines_are_counted() -> None:
+    read, write = os.pipe()
+    log = Unhurried(write)
+    log.setFormatter(_Formatter(journal=True))
+    log.MOST, log.FLUSHED_WITHIN_S = 140_000, 0.1  # type: ignore[misc]
+
+    def say(text: str) -> None:
+        log.handle(logging.LogRecord("bridges", logging.INFO, "", 0, text, None, None))
+
+    for number in range(4):
+        say(f"{number} " + 65536 * "x")
+    log.flush()
+    for line in range(2):
+        assert _line(read).startswith(f"<6>{line} ")
+    assert _line(read) == "<4>log_not_read dropped=2"
+    say("again")
+    assert _line(read) == "<6>again"
+    log.flush()
+    if not (child := os.fork()):
+        say("forked")
+        logging.shutdown([weakref.ref(log)])
+        os._exit(0)
+    os.waitpid(child, 0)
+    assert _line(read) == "<6>forked"
+
+
+def _line(pipe: int) -> str:
+    found = b""
+    while not found.endswith(b"\n"):
+        found += os.read(pipe, 1)
+    return found.decode().rstrip()

@@ -27,9 +27,10 @@ def guarded(
     `outputs_off`. When every output is verified off, the caller must call `all_off`, which ends the
     record and the guard.
     """
+    ours = record.of(config)  # first, because the YAML's path may be relative
     directories.work_somewhere(held.places)
     buses = {name: config.open_bus(name) for name in buses_of(config, device)}
-    held.claim(record.of(config))
+    held.claim(ours)
     watching = guard.Guard(outputs_off)
 
     def all_off() -> None:

@@ -132,7 +132,7 @@ def _off_after(places: Directories, file: Path, died_at: float) -> float | None:
     there. `outputs-off` removes the record after a check that all outputs are off."""
     pause = threading.Event()
     while (after_s := time.monotonic() - died_at) < OFF_WITHIN_S:
-        if not Records(places, file).unreleased():
+        if not Records(places).unreleased():
             return after_s
         pause.wait(LOOK_S)
     return None

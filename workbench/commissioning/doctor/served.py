@@ -64,7 +64,7 @@ def unseen(why: str) -> ServingDaemon:
 
 
 def _nobody(places: Directories, file: Path) -> ServingDaemon:
-    if Records(places, file).unreleased():
+    if Records(places).unreleased():
         found = "the daemon has died, and may have left outputs on"
         do = f"rmf-bridge outputs-off {file}"
         return ServingDaemon([wrong(DAEMON, found, "a relay may hold a door or a call", do)], found)

@@ -160,7 +160,7 @@ def test_after_a_death_the_outputs_come_first(
     tapped: Tapped, module: Module, tmp_path: Path
 ) -> None:
     places = Directories(tmp_path / "run", tmp_path / "run")
-    Records(places, tapped.file).write(record.of(load(tapped.file)))
+    Records(places).write(record.of(load(tapped.file)))
     code, found = doctor(tapped.file, tmp_path, "--listen", "0")
     assert (code, found["daemon"]) == (
         2,
@@ -191,9 +191,7 @@ def test_a_doctor_that_dies_in_its_kill_test_leaves_nothing_on(
         wait_until(lambda: module.relay() == [True, False], "the relay is off")
         assert ended.wait(PATIENCE_S) in (-number, 130)
     places = Directories(tmp_path / "run", tmp_path / "run")
-    wait_until(
-        lambda: not Records(places, module.file).unreleased(), "the outputs are verified off"
-    )
+    wait_until(lambda: not Records(places).unreleased(), "the outputs are verified off")
 
 
 def test_the_kill_test_switches_nothing_on_a_dead_bus(module: Module, tmp_path: Path) -> None:
@@ -205,7 +203,7 @@ def test_the_kill_test_switches_nothing_on_a_dead_bus(module: Module, tmp_path: 
     module.tell("fail", "ward_door", "server", "ok")
     places = Directories(tmp_path / "run", tmp_path / "run")
     wait_until(
-        lambda: not Records(places, module.file).unreleased(),
+        lambda: not Records(places).unreleased(),
         "the guard has verified the outputs off",
     )
 

@@ -84,7 +84,7 @@ def test_walk_refuses_a_device_that_is_served(module: Module, tmp_path: Path) ->
 def test_practice_begins_whatever_a_dead_daemon_has_left_on(module: Module, tmp_path: Path) -> None:
     run = tmp_path / "run"
     run.mkdir(mode=0o700)
-    left = Records(Directories(run, run), module.file).write(of(load(module.file)))
+    left = Records(Directories(run, run)).write(of(load(module.file)))
     words = ("--simulate", "--runtime-dir", run, "--record", tmp_path / "record")
     terminal = Terminal("walk", module.file, *words, environ=environment())
     terminal.wait_for("closed yes")
