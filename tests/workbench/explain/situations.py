@@ -248,6 +248,20 @@ def door_held_by_a_dead_robot() -> Case:
     return scene.heard, "door", "ward"
 
 
+def door_supervisor_forgets_a_robot() -> Case:
+    """RMF's door supervisor restarts while a robot stands in the doorway, and lets the door close."""
+    scene = Scene("ward", rmf=True)
+    red = scene.robot("fleet/red")
+    red.opens("ward")
+    scene.until(red)
+    scene.run(2.0)
+    scene.supervisors["rmf_door_supervisor"].kill()
+    scene.run(1.0)
+    scene.supervisors["rmf_door_supervisor"].start()
+    scene.run(90.0)
+    return scene.heard, "door", "ward"
+
+
 def door_does_not_open() -> Case:
     """The daemon holds the door open, but the door stays shut."""
     scene = Scene("ward")
@@ -380,6 +394,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         two_nodes,
         all_is_well,
         door_held_by_a_dead_robot,
+        door_supervisor_forgets_a_robot,
         door_does_not_open,
         door_without_supervisor,
         door_held_open_by_a_person,
