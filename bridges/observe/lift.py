@@ -35,6 +35,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
     - `supervisor_last`: the time of that request
     - `idle_ends`: the number of successive ENDs of one session while the lift showed another session.
       The tuple also has this session and the time of its last END.
+    - `hazard`: when the lift's present hazard began; None if there is no hazard
     - `taken_from`: the last session that sent no END, but lost the lift to another session
     """
 
@@ -51,6 +52,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         self.adapters_heard = False
         self.supervisor: Fact | None = None
         self.supervisor_last: Moment | None = None
+        self.hazard: Moment | None = None
         self.taken_from = ""
         self.idle_ends: tuple[int, str, Moment] = (0, "", began)
 
@@ -180,6 +182,8 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             yield from self._changed_hands(moment)
         if self.changed and self.before is not None:
             yield News("changed", moment)
+        hazardous = self.state is not None and self.state.current_mode in HAZARDS
+        self.hazard = (self.hazard or moment) if hazardous else None
         for one in self.requesters:
             if one.ended is None and self.matches(one):
                 one.lacks = moment

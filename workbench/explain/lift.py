@@ -85,10 +85,10 @@ def _why(
         kept = lift.session.value != NOBODY
         found.say(
             f"The lift has been in OFFLINE mode {clock.since(lift.mode.since)}: it is out of service or"
-            f" cannot be read, and takes no robot.{f' {lift.keeps(clock.now)}' if kept else ''}",
-            "a person",
-            "find out why it is out of service, or cannot be read",
+            f" cannot be read, and takes no robot.{f' {lift.keeps(clock.now)}' if kept else ''}"
         )
+        _lets_in(found, lift, clock)
+        found.acts("a person", "find out why it is out of service, or cannot be read")
     elif silent is not None and (silent.ended or silent.wants in (lift.floors or silent.wants)):
         not_passed_on(found, lift, silent, clock, around)
     elif lift.session.value != NOBODY:
@@ -203,6 +203,8 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
         found.acts("the controller", ends)
         return
     found.say(lift.keeps(clock.now))
+    if _lets_in(found, lift, clock):
+        return
     theirs = lift.requesters.get(holder)
     stands = lift.door.value == "open" and clock.now.at - lift.door.since.at > STANDS_S
     if mode != "FIRE" or not stands or theirs is None or not theirs.asks(clock.now):
@@ -221,6 +223,33 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
             f"leave the lift alone until the alarm is over; then name {floor} as the recall floor in"
             " the fleet's YAML (`lift_emergency_levels`)",
         )
+
+
+def _lets_in(found: Answer, lift: LiftFacts, clock: TimePhrases) -> bool:
+    """Return whether RMF lets the holder drive in during the hazard, and say so. RMF ignores the mode,
+    so a robot outside the car drives in as soon as session, floor and door match."""
+    who, floor, mode = lift.session.value, lift.floor.value, lift.mode.value
+    theirs, hazard = lift.requesters.get(who), lift.hazard
+    if theirs is None or hazard is None or theirs.ended or not lift.matches(theirs):
+        return False
+    boarded = theirs.boarded is not None and theirs.boarded.at < hazard.at
+    if boarded or lift.told("boarded", clock.now) == "yes":
+        return False
+    if theirs.first.seen and hazard.seen:
+        found.say(
+            f"But the door is open at {floor}, so RMF lets {who} drive in now. {who} was not let in"
+            f" before the lift went into {mode} mode: it is outside, or has driven in since.",
+            "a person",
+            f"keep {who} out of the car, and look whether it has driven in",
+        )
+        return True
+    found.say(
+        f"But the door is open at {floor}. If {who} is outside the car, RMF lets {who} drive in now;"
+        f" whether {who} was in the car before {mode} mode is not known.",
+        "a person",
+        f"look where {who} is: keep it out of the car, or let it drive out",
+    )
+    return True
 
 
 def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
