@@ -11,7 +11,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.observe.lift import ObservedLift
 from bridges.observe.limits import REQUESTER_SILENT_S, SLOWEST_S
-from workbench.judge.adapter_history import AdapterHistory, Wish
+from workbench.judge.adapter_history import SPAM, AdapterHistory, Wish
 from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
 
@@ -24,7 +24,9 @@ FOR_EVER_S: Final = 60.0
 AGAIN: Final = 2
 """Number of breaches in a row that count. A restart of the adapter may explain one breach, but not so
 many."""
-SPAM: Final = 5
+SPAM_S: Final = 10.0
+"""The longest time (s) for SPAM needless ENDs at the pace of the states. A person's presses of a button
+are slower."""
 LISTS: Final = 5
 TASKS_S: Final = 3.0
 """Maximum delay (s) from a new task to the fleet state that shows the task."""
@@ -47,7 +49,7 @@ def _numbers(history: AdapterHistory) -> Finding:
 
 
 def _one_id(history: AdapterHistory) -> Finding:
-    if history.wish is None or history.lists < LISTS:
+    if history.wish is None or history.lists < LISTS or history.wish.ended:
         return None
     who = history.wish.who
     return KEPT if who in history.listed else f"{shown(who)} is no robot in fleet_states"
@@ -154,7 +156,7 @@ def _ends_again(history: AdapterHistory) -> Finding:
     wish, was = history.wish, history.was
     if wish is not None and isinstance(history.device, ObservedLift):
         again = was is not None and was.ended is not None and wish.ended is was.ended
-        return KEPT if again and wish.spare == 1 else None
+        return KEPT if again and len(wish.spare) == 1 else None
     for one in _holders(history):
         silent_s = one.ignored_s(history.now)
         if one.ended and silent_s > SLOWEST_S:
@@ -174,10 +176,12 @@ def _stops_ending(history: AdapterHistory) -> Finding:
     wish = history.wish
     if wish is not None and wish.ended and isinstance(history.device, ObservedLift):
         late_s = history.now - max(wish.ended.at, wish.held_at)
-        if wish.spare < SPAM or late_s < SLOWEST_S or history.device.state is None:
+        spare_s = history.now - wish.spare[0] if len(wish.spare) == SPAM else SPAM_S
+        if spare_s >= SPAM_S or late_s < SLOWEST_S or history.device.state is None:
             return None
         return (
-            f"{wish.spare} ENDs after its session had ended (a defect of RMF: rmf_ros2#382, #415)"
+            f"{SPAM} ENDs within {spare_s:.1f} s, after its session had ended (a defect of RMF:"
+            " rmf_ros2#382, #415)"
         )
     for one in history.stated:
         silent = history.now - one.last.at > REQUESTER_SILENT_S
@@ -226,7 +230,7 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A7.id",
         "Each robot has one id, fleet/robot, for lifts and doors",
-        "a request after 5 fleet_states of the fleet",
+        "a request (not END) after 5 fleet_states of the fleet",
         "A lift knows a robot by its session's name. With a second name, the robot is a stranger",
         "rmf_ros2 agv/RobotContext.cpp:1425",
         _one_id,

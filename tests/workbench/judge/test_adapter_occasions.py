@@ -1,18 +1,19 @@
 """The laws for fleet adapters. Each law has an occasion: the event at which a wrong adapter would break
 the law. If the messages contain no such event, the verdict is "not seen"."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import pytest
 from msgspec.structs import replace
 
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from bridges.messages.heard import Heard
+from bridges.messages.heard import Heard, Sender
 from bridges.messages.stamps import stamp
 from tests.workbench.judge.script import door, lift
 from tests.workbench.judge.test_limits import OPEN, RED, Line, car, held, leaf, seconds
 from workbench.judge.judge import LAWS, Judge
+from workbench.judge.law import Verdict
 
 BLUE = "fleet/blue"
 Lines = list[Line]
@@ -27,6 +28,16 @@ def verdict(law: str, lines: Lines, name: str = "fleet") -> tuple[str, str]:
     last = lines[-1][0]
     [found] = judge.end(last, last)
     return found.verdict.value, found.evidence[0].text if found.evidence else ""
+
+
+def broken(lines: Iterable[Heard], name: str = "fleet") -> set[str]:
+    """Return the laws that this adapter breaks."""
+    judge = Judge("adapter", name)
+    told = sorted(lines, key=lambda one: one.at)
+    for one in told:
+        judge.hear(one)
+    last = told[-1].at
+    return {one.law.id for one in judge.end(last, last) if one.verdict is Verdict.BROKEN}
 
 
 def asks(at: float, floor: str = "L1", who: str = RED, **fields: int) -> Line:
@@ -203,3 +214,64 @@ def test_one_robot_is_judged_by_its_own_requests() -> None:
     wrong = [asks(12.5, "l3", BLUE)]
     assert verdict("A7.floor", [*boards(), *wrong])[0] == "broken"
     assert verdict("A7.floor", [*boards(), *wrong], RED)[0] == "kept"
+
+
+# ---- the adapter, or a dashboard: rmf-web sends END for every robot that it knows
+
+ADAPTER, WEB = Sender("/fleet_adapter"), Sender("/rmf_web")
+
+
+def sent(lines: Lines, by: Sender | None = None) -> list[Heard]:
+    """Return these messages, with their publisher. None: the wire or the recording does not name it."""
+    return [Heard(at, at, topic.name, message, by) for at, topic, message in lines]
+
+
+def end_of(at: float, who: str = RED, clock_s: float = 1e3) -> Line:
+    request = replace(lift(who, "", kind=0), request_time=stamp(clock_s + at))
+    return at, topics.ADAPTER_LIFT_REQUESTS, request
+
+
+DAY: Lines = [*many(0.0, 80.0, car), *alive(80.0)]
+RIDE: Lines = [*arrives(), ends(18.5), *many(19.0, 80.0, car), *alive(80.0)]
+
+
+def test_an_end_for_a_robot_that_is_gone_is_no_id_of_the_adapter() -> None:
+    pressed = [end_of(30.0, "fleet/old"), end_of(30.0), end_of(30.0, "other/old")]
+    assert broken(sent([*DAY, *pressed])) == set()
+    asked = [asks(30.0, "L1", "fleet/old"), *pressed]
+    assert broken(sent([*DAY, *asked])) == {"A7.id"}
+
+
+def test_a_persons_presses_do_not_add_up_to_an_adapter_that_ends_for_ever() -> None:
+    pressed = [end_of(10.0 + 8.0 * n) for n in range(8)]
+    assert broken(sent([*DAY, *pressed])) == set()
+    repeated = [end_of(10.0 + 2.0 * n) for n in range(8)]
+    assert broken(sent([*DAY, *repeated])) == {"A7.stops"}
+
+
+def test_on_a_wire_that_names_publishers_only_the_adapters_own_requests_count() -> None:
+    repeated = many(30.0, 40.0, end_of)
+    ride = sent(RIDE, ADAPTER)
+    assert broken([*ride, *sent(repeated, WEB)]) == set()
+    assert broken([*ride, *sent(repeated, ADAPTER)]) == {"A7.stops"}
+    assert broken([*ride, *sent(repeated, Sender())]) == {"A7.stops"}, "not yet discovered"
+
+
+def test_a_close_that_a_person_sends_for_a_robot_does_not_acquit_its_adapter() -> None:
+    times = (5.0, 17.0, 29.0)
+    passages = [line for at in times for line in passes(at, closes=False)]
+    closes = [opens(at + 8.5, 0) for at in times]
+    assert broken(sent([*passages, *closes], ADAPTER)) == set()
+    assert broken([*sent(passages, ADAPTER), *sent(closes, WEB)]) == {"A8.closes"}
+
+
+def test_a_person_who_asks_in_a_robots_name_is_not_its_adapter() -> None:
+    asked = [opens(70.0), *many(71.0, 79.0, end_of)]
+    assert broken([*sent(RIDE, ADAPTER), *sent(asked, Sender("/rmf_bridge_send"))]) == set()
+
+
+def test_the_clock_of_a_dashboard_is_not_the_adapters() -> None:
+    pressed = [end_of(at, clock_s=5e3) for at in (7.2, 9.2, 25.0)]
+    lines = [*RIDE, *many(19.5, 30.0, asks), *pressed]
+    for one in (sent(lines), [*sent(lines[: -len(pressed)], ADAPTER), *sent(pressed, WEB)]):
+        assert "A7.stamp" not in broken(one)
