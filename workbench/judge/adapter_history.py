@@ -23,6 +23,9 @@ heard. Lost messages cannot explain so many states without a request."""
 ALARMS_S: Final = 60.0
 """Time (s) after the start or end of an alarm in which robots may change their route."""
 BACK_S: Final = 0.5
+AGAIN: Final = 2
+"""Number of breaches in a row that count. A restart of the adapter or a step of its clock may explain
+one breach, but not so many."""
 SPAM: Final = 5
 """Number of needless ENDs that is a breach, if they come at the pace of the lift's states."""
 ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name)
@@ -78,7 +81,7 @@ class AdapterHistory(AnyHistory):
     - `stated`: the visits to the device that published the latest state.
     - `listed`: the robots in the fleet's states.
     - `lists`: number of fleet states heard.
-    - `back`: robot -> how often the stamp of a request was older than the stamp before.
+    - `back`: when the stamps of the latest request's kind and robot last went back (AGAIN times).
     - `lapses`: `Wish.visits` -> number of waits in a row in which the adapter sent only one request.
     - `unclosed`: robot -> number of passages in a row without CLOSE.
     """
@@ -94,7 +97,8 @@ class AdapterHistory(AnyHistory):
         self.listed: set[str] = set()
         self.lists = 0
         self.stamped = self.stepped = False
-        self.back: dict[str, int] = {}
+        self.back: deque[float] = deque(maxlen=AGAIN)
+        self._backs: dict[str, deque[float]] = {}
         self.lapses: dict[str, int] = {}
         self.unclosed: dict[str, int] = {}
         self._wishes: dict[str, Wish] = {}
@@ -185,8 +189,7 @@ class AdapterHistory(AnyHistory):
     def _is_replayed(self, message: d.LiftRequest | d.DoorRequest) -> bool:
         """Return whether this is an old message that its publisher retained for late listeners.
         Otherwise remember the message's stamp."""
-        who = _who(message)
-        key, at = f"{words.kind(message)} {who}", in_seconds(message.request_time)
+        key, at = f"{words.kind(message)} {_who(message)}", in_seconds(message.request_time)
         newest, recent = self._stamps.get(key, (0.0, deque(maxlen=100)))
         older = 0.0 < at < newest - BACK_S
         again = 0.0 < at < newest and message in recent
@@ -198,8 +201,10 @@ class AdapterHistory(AnyHistory):
             self.stamped, at = False, newest  # perhaps of another node, with another clock
         if at > 0.0:
             keep(self._stamps, key, (at, recent))
+        self.back = self._backs.get(key) or deque(maxlen=AGAIN)
         if older and self.stamped:
-            keep(self.back, who, self.back.get(who, 0) + 1)
+            self.back.append(self.now)
+            keep(self._backs, key, self.back)
         return False
 
     def _ask(self, device: AnyDevice, message: d.LiftRequest | d.DoorRequest, now: Moment) -> bool:

@@ -11,8 +11,8 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.observe.lift import ObservedLift
 from bridges.observe.limits import REQUESTER_SILENT_S, SLOWEST_S
-from workbench.judge.adapter_history import SPAM, AdapterHistory, Wish
-from workbench.judge.history import NOT_YET
+from workbench.judge.adapter_history import AGAIN, SPAM, AdapterHistory, Wish
+from workbench.judge.history import NOT_YET, OFTEN_S
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
 
 CONTEXT: Final = "rmf_ros2 agv/RobotContext.cpp:1700-1735"
@@ -21,9 +21,6 @@ DOOR_OPEN: Final = "rmf_ros2 phases/DoorOpen.cpp"
 NEVER_ENDS_S: Final = 60.0
 """Time (s) of silence after which a robot can no longer be on its way out of a car."""
 FOR_EVER_S: Final = 60.0
-AGAIN: Final = 2
-"""Number of breaches in a row that count. A restart of the adapter may explain one breach, but not so
-many."""
 SPAM_S: Final = 10.0
 """The longest time (s) for SPAM needless ENDs at the pace of the states. A person's presses of a button
 are slower."""
@@ -60,8 +57,8 @@ def _stamps(history: AdapterHistory) -> Finding:
         return None
     if not history.stepped:
         return KEPT
-    back = history.back[history.wish.who]
-    return f"its stamps went back {back} times" if back >= AGAIN else None
+    again = history.often(history.back)
+    return f"its stamps went back {AGAIN} times within {OFTEN_S:.0f} s" if again else None
 
 
 def _floors(history: AdapterHistory) -> Finding:
@@ -237,7 +234,8 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     ),
     Law(
         "A7.stamp",
-        "No request of a robot has an older stamp than the robot's request before",
+        "No request of a robot has an older stamp than the robot's request before, except after a step"
+        " of the clock",
         "two requests with stamps",
         "RMF's door supervisor ignores a CLOSE older than the OPEN. The door stays open",
         "rmf_ros2 door_supervisor/Node.cpp",

@@ -103,6 +103,10 @@ class AnyHistory(ABC):
         """Forget what lasts only until the next check, because the laws have checked the latest
         message."""
 
+    def often(self, times: deque[float]) -> bool:
+        """Return whether `times` is full, and all its times are within OFTEN_S."""
+        return len(times) == times.maxlen and self.now - times[0] < OFTEN_S
+
     def pass_time(self, now: float, wall: float) -> None:
         """Note that time has passed without a message."""
         self.now, self.news = now, None
@@ -203,10 +207,6 @@ class History(AnyHistory, Generic[T]):
 
     def forget(self) -> None:
         """Forget requests after a pause, because the node may have restarted."""
-
-    def often(self, times: deque[float]) -> bool:
-        """Return whether `times` is full, and all its times are within OFTEN_S."""
-        return len(times) == times.maxlen and self.now - times[0] < OFTEN_S
 
     def asked(self) -> None:
         """Note a request to this device."""

@@ -40,8 +40,8 @@ def broken(lines: Iterable[Heard], name: str = "fleet") -> set[str]:
     return {one.law.id for one in judge.end(last, last) if one.verdict is Verdict.BROKEN}
 
 
-def asks(at: float, floor: str = "L1", who: str = RED, **fields: int) -> Line:
-    request = replace(lift(who, floor), request_time=stamp(1e3 + at), **fields)
+def asks(at: float, floor: str = "L1", who: str = RED, clock_s: float = 1e3, **fields: int) -> Line:
+    request = replace(lift(who, floor), request_time=stamp(clock_s + at), **fields)
     return at, topics.ADAPTER_LIFT_REQUESTS, request
 
 
@@ -275,3 +275,26 @@ def test_the_clock_of_a_dashboard_is_not_the_adapters() -> None:
     lines = [*RIDE, *many(19.5, 30.0, asks), *pressed]
     for one in (sent(lines), [*sent(lines[: -len(pressed)], ADAPTER), *sent(pressed, WEB)]):
         assert "A7.stamp" not in broken(one)
+
+
+def test_a_clock_that_is_set_back_once_convicts_no_adapter_though_both_kinds_go_back() -> None:
+    def back_s(at: float) -> float:
+        return 3600.0 if at > 50.0 else 0.0
+
+    def at_lift(at: float) -> Line:
+        return asks(at, clock_s=1e4 - back_s(at))
+
+    lines = [
+        *(*DAY, *many(20.0, 25.0, at_lift), *many(60.0, 65.0, at_lift)),
+        *(opens(at, mode, back_s(at)) for at, mode in ((10.0, 2), (11.0, 0), (55.0, 2), (56.0, 0))),
+    ]
+    assert verdict("A7.stamp", lines)[0] == "kept"
+
+
+@pytest.mark.parametrize(("apart_s", "wrong"), [(29.0, True), (31.0, False)])
+def test_stamps_that_go_back_twice_count_only_within_half_a_minute(
+    apart_s: float, wrong: bool
+) -> None:
+    steps = [(0.0, 0.0), (20.0, 30.0), (20.0 + apart_s, 90.0)]
+    lines = [*DAY, *(opens(at, 2, late_s) for at, late_s in steps)]
+    assert (verdict("A7.stamp", lines)[0] == "broken") == wrong
