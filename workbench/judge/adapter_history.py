@@ -79,7 +79,7 @@ class AdapterHistory(AnyHistory):
     - `wish`: the visit to which the latest request belongs.
     - `was`: a copy of this visit from before the request.
     - `stated`: the visits to the device that published the latest state.
-    - `listed`: the robots in the fleet's states.
+    - `listed`: the robots in the fleet's states. `present`: the robots in the latest of these states.
     - `lists`: number of fleet states heard.
     - `back`: when the stamps of the latest request's kind and robot last went back (AGAIN times).
     - `lapses`: `Wish.visits` -> number of waits in a row in which the adapter sent only one request.
@@ -95,6 +95,7 @@ class AdapterHistory(AnyHistory):
         self.was: Wish | None = None
         self.stated: list[Wish] = []
         self.listed: set[str] = set()
+        self.present: set[str] = set()
         self.lists = 0
         self.stamped = self.stepped = False
         self.back: deque[float] = deque(maxlen=AGAIN)
@@ -168,6 +169,7 @@ class AdapterHistory(AnyHistory):
         if fleet.name != self.fleet:
             return
         self.lists, self._alive_at = self.lists + 1, self.now
+        self.present = {f"{fleet.name}/{robot.name}" for robot in fleet.robots}
         for robot in fleet.robots:
             who = f"{fleet.name}/{robot.name}"
             if len(self.listed) < REMEMBERED:
@@ -296,8 +298,9 @@ class AdapterHistory(AnyHistory):
         return bool(self.stated)
 
     def _count(self, wish: Wish, before: float) -> None:
-        """If the robot has sent no request since the previous state, count that state as ignored."""
-        if wish.last.at >= before:
+        """If the robot has sent no request since the previous state, count that state as ignored. A
+        restarted adapter knows nothing of a robot that its fleet's states do not list."""
+        if wish.last.at >= before or (self.lists and wish.who not in self.present):
             wish.ignored = 0
         elif self._alive_at > before:
             wish.ignored_since = wish.ignored_since if wish.ignored else before

@@ -298,3 +298,18 @@ def test_stamps_that_go_back_twice_count_only_within_half_a_minute(
     steps = [(0.0, 0.0), (20.0, 30.0), (20.0 + apart_s, 90.0)]
     lines = [*DAY, *(opens(at, 2, late_s) for at, late_s in steps)]
     assert (verdict("A7.stamp", lines)[0] == "broken") == wrong
+
+
+@pytest.mark.parametrize("returns_at", [80.1, 60.1])
+def test_an_adapter_that_has_restarted_without_a_robot_cannot_end_its_session(
+    returns_at: float,
+) -> None:
+    """The robot was switched off while it had the lift. From its return on, its adapter is to blame."""
+    lines = [
+        *arrives(140.0),
+        *many(0.1, 20.0, fleet),
+        *many(30.1, returns_at, lambda s: fleet(s, robot="blue")),
+    ]
+    assert broken(sent(lines)) == set()
+    back = many(returns_at, 140.0, fleet)
+    assert broken(sent([*lines, *back])) == ({"A7.ends"} if returns_at < 70.0 else set())
