@@ -191,6 +191,14 @@ class History(AnyHistory, Generic[T]):
         if before is not self._sender and len(self.seen.publishers(moment)) > 1:
             self.turns.append(heard.at)
 
+    @property
+    def publisher(self) -> str:
+        """The node that publishes the device's states; "" if nobody knows. The topic's only publisher
+        publishes this device too."""
+        if self._sender is not None:
+            return self._sender.node
+        return self.senders[0] if len(self.senders) == 1 else ""
+
     @abstractmethod
     def take_other(self, heard: Heard) -> bool:
         """Take a message that is not a state."""

@@ -337,7 +337,7 @@ def no_false(history: LiftHistory) -> Finding:
 def retained(history: LiftHistory) -> Finding:
     """Check that the alarm's publisher is TRANSIENT_LOCAL. Fleet adapters receive nothing from a
     volatile publisher."""
-    if history.volatile is None:
+    if history.volatile is None or history.others:
         return None
     return (
         "its publisher is volatile, so fleet adapters do not receive its messages"

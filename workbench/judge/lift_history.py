@@ -340,8 +340,9 @@ class LiftHistory(History[d.LiftState]):
             self.unserved_at = self.now if unserved else self.unserved_at
 
     def _alarm(self, on: bool, sender: Sender | None) -> bool:
-        """Take a message on the fire topic, if this lift's node or an unknown node sent it."""
-        if sender and self._sender and sender.node != self._sender.node:
+        """Take a message on the fire topic, if this lift's node sent it. A message whose sender nobody
+        knows may be of a fire panel."""
+        if sender is None or sender.node != self.publisher or not sender.node:
             return False
         self.called_off = self.alarmed and not on
         if not on and not self.alarmed:

@@ -7,7 +7,7 @@ import pytest
 
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from bridges.messages.heard import Heard
+from bridges.messages.heard import Heard, Sender
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
 from tests.site.timeline import EPOCH
@@ -27,6 +27,7 @@ NAMES: dict[JudgedKind, str] = {
     "dispenser": "store",
     "ingestor": "intake",
 }
+NODE = Sender("/node")
 Line = tuple[float, AnyTopic, d.Message]
 Story = Callable[[float], list[Line]]
 
@@ -37,7 +38,7 @@ def is_broken(kind: JudgedKind, law: str, lines: list[Line]) -> bool:
     judge = Judge(kind, NAMES[kind])
     lines.sort(key=lambda line: line[0])
     for at, topic, message in lines:
-        judge.hear(Heard(at, at, topic.name, message))
+        judge.hear(Heard(at, at, topic.name, message, NODE))
     at = lines[-1][0]
     judge.end(at, at)
     return law in {j.law.id for j in judge.end(at + 2.0, at) if j.verdict is Verdict.BROKEN}

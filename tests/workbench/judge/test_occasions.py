@@ -3,6 +3,7 @@ Without an occasion the verdict is "not seen". With an occasion a correct node k
 wrong node breaks it."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -45,6 +46,7 @@ from tests.workbench.judge.test_limits import (
 from tests.workbench.judge.workcell_stories import WorkcellLines, stories
 from workbench.judge.judge import LAWS, Judge, JudgedKind
 
+LIFTS, PANEL = Sender("/lift_node"), Sender("/fire_panel")
 ERROR, RELEASED = 200, 4
 HUMAN, OFFLINE = 1, 4
 NEVER_READ = -1e3
@@ -87,13 +89,18 @@ def verdict(kind: JudgedKind, law: str, lines: Lines) -> str:
     return found.verdict.value
 
 
+FALSES = ((1.0, False), (2.0, False), (3.0, False))
+
+
 def moving(at: float, door: int = CLOSED) -> Line:
     at, topic, state = car(at, door=door)
     return at, topic, replace(state, motion_state=1)
 
 
-def alarm(at: float, on: bool) -> Line:
-    return at, topics.FIRE_ALARM_TRIGGER, Bool(on)
+def alarms(*lines: tuple[float, bool], by: Sender | None = LIFTS) -> Lines:
+    """Return a state of the lift's node, and alarm messages of the node `by`."""
+    state: Any = (*car(0.0), LIFTS)
+    return [state, *((at, topics.FIRE_ALARM_TRIGGER, Bool(on), by) for at, on in lines)]
 
 
 def twins(line: Callable[[float], Line]) -> Lines:
@@ -217,9 +224,9 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
         [*TO_FIRE, asks(7.5), held(8.0, mode=FIRE)],
     ),
     ("lift", "L12.false"): (
-        [car(0.0), alarm(1.0, False), alarm(2.0, True)],
-        [car(0.0), alarm(1.0, True), alarm(2.0, False)],
-        [car(0.0), *(alarm(n, False) for n in (1.0, 2.0, 3.0))],
+        alarms((1.0, False), (2.0, True)),
+        alarms((1.0, True), (2.0, False)),
+        alarms(*FALSES),
     ),
     ("lift", "L12.retained"): (
         cars(),
@@ -316,6 +323,49 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
 def test_a_law_needs_its_occasion(kind: JudgedKind, law: str) -> None:
     found = [verdict(kind, law, story) for story in STORIES[kind, law]]
     assert found == ["not seen", "kept", "broken"]
+
+
+@pytest.mark.parametrize("by", [None, Sender(), PANEL])
+def test_a_false_of_an_unknown_node_or_of_a_panel_is_not_the_lifts(by: Sender | None) -> None:
+    """A fire panel that repeats `false` is real, and `ros2` and rosbag2 name no sender."""
+    assert verdict("lift", "L12.false", alarms(*FALSES, by=by)) == "not seen"
+
+
+@pytest.mark.parametrize(
+    ("shown", "names", "volatile", "found"),
+    [
+        ([], ("/a", "/b"), "/b", "not seen"),
+        ([], ("/a", "/b"), "/a", "not seen"),
+        ([], ("/a", "?"), "/a", "not seen"),
+        ([], ("/a",), "/a", "broken"),
+        ([Sender("/a")], ("/a", "/b"), "/b", "not seen"),
+        ([Sender("/a")], ("/a", "/b"), "/a", "broken"),
+    ],
+)
+def test_a_volatile_alarm_is_the_lifts_only_if_its_own_node_publishes_it(
+    shown: list[Sender], names: tuple[str, ...], volatile: str, found: str
+) -> None:
+    """`shown` names the states' publisher, and `names` all nodes that publish states of lifts."""
+
+    def look(judge: Judge, *, others: bool = False) -> None:
+        judge.hear(Heard(0.0, 0.0, "lift_states", car(0.0)[2], *shown))
+        judge.history.others |= {"Lift2"} if others else set()
+        judge.history.senders = names
+        for _ in range(2):
+            judge.alarm_ends([volatile], [], 0.0, 0.0)
+
+    assert verdict("lift", "L12.retained", [*cars(), look]) == found
+    assert verdict("lift", "L12.retained", [*cars(), partial(look, others=True)]) == "not seen"
+
+
+def test_the_publisher_of_another_lift_makes_no_second_node_of_this_one() -> None:
+    uneven = [car(n + by) for n in range(8) for by in (0.0, 0.3)]
+    assert verdict("lift", "B0.one", [senders("/a", "/b"), *uneven]) == "broken"
+
+    def two_lifts(judge: Judge) -> None:
+        judge.history.others.add("Lift2")
+
+    assert verdict("lift", "B0.one", [senders("/a", "/b"), two_lifts, *uneven]) == "not seen"
 
 
 def test_every_law_has_its_stories() -> None:
