@@ -391,6 +391,26 @@ def test_a_listing_state_that_was_lost_or_comes_late_accuses_no_workcell() -> No
     assert verdict("dispenser", "W2.lists", [of.state(0.0), *quick]) == "not seen"
 
 
+@pytest.mark.parametrize(
+    ("asks_until", "delisted_at", "found"),
+    [
+        (4.0, 600.0, "not seen"),
+        (4.0, 8.0, "not seen"),
+        (4.0, 5.0, "broken"),
+        (600.0, 600.0, "broken"),
+    ],
+)
+def test_a_failed_request_may_leave_the_queue_when_rmf_no_longer_asks_for_it(
+    asks_until: float, delisted_at: float, found: str
+) -> None:
+    of = WorkcellLines("dispenser")
+    served = [of.ask(0.1), of.state(0.2, "a", mode=1), of.result(0.3, 0), of.result(3.5, 2)]
+    asked = [of.ask(float(n)) for n in range(1, int(asks_until) + 1)]
+    listed = of.states(delisted_at - 1.0, "a", begin=1.0)
+    lines: Lines = [*served, *asked, *listed, *of.states(delisted_at + 5.0, begin=delisted_at)]
+    assert verdict("dispenser", "W2.done", lines) == found
+
+
 def test_a_request_that_leaves_without_a_result_is_a_breach_the_second_time_or_after_a_restart() -> (
     None
 ):
@@ -407,5 +427,9 @@ def test_a_request_that_leaves_without_a_result_is_a_breach_the_second_time_or_a
     assert verdict("dispenser", "W2.done", [of.state(0.0), *dropped(1.0, "a")]) == "not seen"
     twice: Lines = [of.state(0.0), *dropped(1.0, "a"), *dropped(5.0, "b")]
     assert verdict("dispenser", "W2.done", twice) == "broken"
+    failed = [of.state(1.0, "a"), of.result(1.5, 2), of.state(6.0), *of.states(9.0, begin=7.0)]
+    assert (
+        verdict("dispenser", "W2.done", [of.state(0.0), *failed, *dropped(10.0, "b")]) == "not seen"
+    )
     restarted: Lines = [*of.states(3.0), of.state(3.5, "a"), of.state(12.0), of.state(13.0)]
     assert verdict("dispenser", "W2.done", [*restarted, of.state(14.5)]) == "broken"
