@@ -7,11 +7,15 @@ from bridges.messages import words
 from bridges.observe.lift import HAZARDS
 from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, shown
-from workbench.judge.lift_history import ASKED_S, GRACE_S, LATE_S, LiftHistory, moves
+from workbench.judge.lift_history import (
+    ASKED_S,
+    ENDS_WITHIN_S,
+    GRACE_S,
+    LATE_S,
+    LiftHistory,
+    moves,
+)
 
-ENDS_WITHIN_S: Final = 3.0
-"""Maximum time (s) until an END takes effect. It allows one state period of 2 s, and one scan of the
-inputs."""
 GRANTS_WITHIN_S: Final = 30.0
 GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5

@@ -298,6 +298,26 @@ LIFT: list[tuple[str, Story, float, float]] = [
         4.9,
         5.1,
     ),
+    (  # the robot asks again after an END of its earlier ride, and the lift drops the new session
+        "L4.ends",
+        lambda x: [
+            *(car(0.0), asks(0.5), held(1.0), *seconds(1.5, 6.0, held), ends(6.4), car(7.0)),
+            *seconds(8.0, 30.0, asks),
+            *seconds(8.5, 6.4 + x, held),
+            car(6.4 + x),
+        ],
+        8.9,
+        9.1,
+    ),
+    (  # the session has survived an END of a restarted supervisor, which then forwards requests again
+        "L4.ends",
+        lambda x: [
+            *(car(0.0), *seconds(0.5, 30.0, asks), *seconds(0.6, 30.0, robot_asks)),
+            *(ends(6.2), *seconds(1.0, 6.2 + x, held), car(6.2 + x)),
+        ],
+        8.9,
+        9.1,
+    ),
     (  # the supervisor has ended the session, but the robot in the car goes on asking, until it dies
         "L4.ends",
         lambda x: [
