@@ -33,6 +33,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
     - `adapters_heard`: Was a fleet adapter heard?
     - `supervisor`: the session in the supervisor's last request on `lift_requests`, or "" after an END
     - `supervisor_last`: the time of that request
+    - `granted_unheard`: Was a session granted before any message on `lift_requests` was heard?
     - `idle_ends`: the number of successive ENDs of one session while the lift showed another session.
       The tuple also has this session and the time of its last END.
     - `hazard`: when the lift's present hazard began; None if there is no hazard
@@ -52,6 +53,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         self.adapters_heard = False
         self.supervisor: Fact | None = None
         self.supervisor_last: Moment | None = None
+        self.granted_unheard = False
         self.hazard: Moment | None = None
         self.taken_from = ""
         self.idle_ends: tuple[int, str, Moment] = (0, "", began)
@@ -90,6 +92,12 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             if self.is_silent(now) or not self.matches(one):
                 yield Wait(one.who, one.wants, one.lacks)
 
+    @property
+    def unrecorded(self) -> bool:
+        """Return whether `lift_requests` cannot be heard: nothing came on this topic, though a session
+        was granted. Such a recording does not contain the topic."""
+        return self.granted_unheard and self.supervisor_last is None
+
     def not_passed_on(self, now: Moment) -> DeviceRequester | None:
         """Return a robot whose requests RMF's supervisor does not forward to the lift. The robot
         repeats a request or an END, but no message comes on `lift_requests`.
@@ -97,13 +105,11 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         If a robot has the lift, only this robot counts, because RMF's supervisor drops the requests of
         all other robots (lift_supervisor/Node.cpp). If the lift is free, any robot counts.
 
-        Return None if a robot got the lift and no message ever came on `lift_requests`. In that case
-        the recording does not contain that topic.
+        Return None if `lift_requests` is unrecorded.
         """
         silent_at, holder = now.at - REQUESTER_SILENT_S, self.session.value
         last = self.supervisor_last
-        unrecorded = last is None and holder != NOBODY and self.session.since.seen
-        if unrecorded or (last is not None and last.at > silent_at):
+        if self.unrecorded or (last is not None and last.at > silent_at):
             return None
         asks = (
             one
@@ -213,6 +219,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             if old is not None:
                 yield self._over(moment, old)
         if holder != NOBODY and not first:
+            self.granted_unheard |= self.supervisor_last is None
             yield News("has", moment, holder, requester=new)
         if new is not None and holder != NOBODY:
             new.granted = moment

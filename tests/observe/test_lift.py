@@ -151,6 +151,11 @@ def test_a_grant_without_a_request_of_the_supervisor_shows_an_unrecorded_topic()
     for _ in range(9):
         story.lift(RED).passes(1).asks(RED)
     assert not_passed_on(story) == ""
+    story.ends(RED).lift()
+    for _ in range(9):
+        story.lift().passes(1).asks(BLUE)
+    assert not_passed_on(story) == ""
+    assert not_passed_on(story.asks(RED, passed=True).passes(5).asks(BLUE).lift()) == BLUE
 
 
 def test_only_an_abandoned_wish_is_remembered() -> None:

@@ -119,6 +119,14 @@ def end_not_obeyed(
             "the supervisor",
             f"pass on END of {claim.who}; the supervisor's log says why it does not",
         )
+    elif claim.own and not claim.end_passed_on:
+        found.say(
+            f"{claim.who} sent END at {at}, and the lift still shows its session. Nothing was heard on"
+            " `lift_requests`, so it is not known whether the supervisor passed the END on.",
+            "a person",
+            f"see in the log of the lift's node whether it has the END of {claim.who}; until the"
+            f" session ends, when the car is empty: {release(lift)}",
+        )
     else:
         found.say(
             f"{claim.who} sent END at {at}, and the lift still shows its session.",
