@@ -89,8 +89,13 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         """Yield a `Wait` for each requester to which the lift's states do not yet show what it
         wants."""
         for one in self.asking(now):
-            if self.is_silent(now) or not self.matches(one):
+            if self.is_silent(now) or not self.is_served(one):
                 yield Wait(one.who, one.wants, one.lacks)
+
+    def is_served(self, one: DeviceRequester) -> bool:
+        """Return whether the requester has what it wants. A session in HUMAN mode waits for nothing
+        more, because people call the lift."""
+        return self.matches(one) or (one.human and one.who == self.session.value)
 
     @property
     def unrecorded(self) -> bool:
@@ -139,6 +144,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             return
         wants, stands = self.text(message.destination_floor), self.is_silent(moment)
         one, new = self.requesters.ask(who, wants, moment, keep=self.session.value, stands=stands)
+        one.human = message.request_type == d.LiftRequestType.REQUEST_HUMAN_MODE
         one.own = one.own or not passed_on
         one.passed_on = moment if passed_on else one.passed_on
         one.stamp(moment, message.request_time)

@@ -67,6 +67,7 @@ class DeviceRequester:
     - `reached`: the last fulfilled wish
     - `given_up`: the wish before the present wish, if it was not fulfilled
     - `end_passed_on`: Has the supervisor sent END to the device?
+    - `human`: Does the present wish ask for a lift's HUMAN mode?
     - `gone`: Has the requester stopped asking without END?
     - `times`: the number of requests
     - `own`: Was a message of the requester itself heard, and not only the supervisor's messages?
@@ -92,6 +93,7 @@ class DeviceRequester:
     ended: Moment | None = None
     end_last: Moment | None = None
     end_passed_on: bool = False
+    human: bool = False
     gone: bool = False
     stamped: bool = False
     stamp_age_s: float = 0.0

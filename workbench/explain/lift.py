@@ -49,13 +49,13 @@ def answer(
     if focus and claim is None:
         told = "its last ride is shown below" if lift.kept else "no request from it was heard"
         found.say(f"{label(focus)} does not have {lift.name} and does not request it now: {told}.")
-    if claim is not None and claim.ended is None and not lift.matches(claim):
+    if claim is not None and claim.ended is None and not lift.is_served(claim):
         where = claim.wants or "no floor"
         found.say(f"{claim.who} has waited {clock.since(claim.since)} for {lift.name} at {where}.")
     _hold(found, lift, clock)
     if len(lift.flaps(clock.now)) < FLAPS and (old := common.old_reading(lift, clock)):
         found.say(old)
-    if claim is not None and claim.ended is None:
+    if claim is not None and claim.ended is None and not claim.human:
         found.asks, found.fields = claim.who, _fields(lift, claim, clock)
         found.notes += common.clock_of(claim)
     _why(found, lift, claim, clock, around)
@@ -107,7 +107,7 @@ def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceReque
     """
     if focus:
         return lift.requesters.get(focus)
-    waiting = [one for one in lift.asking(clock.now) if not lift.matches(one)]
+    waiting = [one for one in lift.asking(clock.now) if not lift.is_served(one)]
     if waiting:
         return min(waiting, key=lambda one: one.since.at)
     return lift.requesters.get(lift.session.value)
@@ -172,7 +172,7 @@ def _others_wait(
     others = [
         one
         for one in lift.asking(clock.now)
-        if one is not claim and one.who != lift.session.value and not lift.matches(one)
+        if one is not claim and one.who != lift.session.value and not lift.is_served(one)
     ]
     texts = [f"{one.who} at {one.wants} {clock.since(one.since)}" for one in others[:4]]
     if texts:
@@ -259,6 +259,8 @@ def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.Oth
     theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
         lift_holder.end_not_obeyed(found, lift, theirs, clock)
+    elif theirs and theirs.human and (lift.mode.value == "HUMAN" or not lift.matches(theirs)):
+        lift_holder.has_human_mode(found, lift, theirs, clock)
     elif theirs is None or not theirs.asks(clock.now):
         lift_holder.without_word(found, lift, clock, around)
     elif lift.matches(theirs):
