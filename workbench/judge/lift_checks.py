@@ -296,12 +296,14 @@ def unserved(history: LiftHistory) -> Finding:
 
 
 def lets_nobody_in(history: LiftHistory) -> Finding:
-    """Check that the lift lets no robot in during a hazard."""
+    """Check that the lift lets no robot in during a hazard. RMF lets a robot in only at the floor that
+    the robot requests, so a robot elsewhere stays out (RequestLift.cpp)."""
     state = history.new
     if state is None or state.current_mode not in HAZARDS or not state.session_id:
         return None
-    if history.offers:
-        return words.described(state)
+    ask = history.asks.get(state.session_id)
+    if history.offers and (ask is None or ask.floor == state.current_floor):
+        return words.described(state) if ask else None
     return None if history.offered else KEPT
 
 

@@ -237,7 +237,9 @@ class LiftHistory(History[d.LiftState]):
         elsewhere = self.before is not None and self.before.current_floor != state.current_floor
         self.travelled |= moves(state) or elsewhere
         opened = self.claims(state)
-        wanted = (state.destination_floor, *self._wanted())
+        wanted = self._wanted()
+        if state.current_mode not in HAZARDS:  # in a hazard the car may go to its recall floor
+            wanted = (state.destination_floor, *wanted)
         self.offers = bool(opened and self.session and not self.offered)
         self._look_at_door(state, opened)
         if self.offers and state.current_floor in wanted:

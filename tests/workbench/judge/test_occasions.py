@@ -217,7 +217,11 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
         rides(asks(2.5, floor="L9")),
         rides(asks(2.5, floor="L9"), held(6.0, to="L9")),
     ),
-    ("lift", "L10.board"): (rides(), rides(mode=FIRE), rides(mode=FIRE, **BOARDS)),
+    ("lift", "L10.board"): (
+        rides(),
+        rides(mode=FIRE),
+        rides(asks(0.6, floor="L1"), mode=FIRE, **BOARDS),
+    ),
     ("lift", "L10.grant"): (
         TO_FIRE,
         [*TO_FIRE, asks(2.5)],
@@ -366,6 +370,21 @@ def test_the_publisher_of_another_lift_makes_no_second_node_of_this_one() -> Non
         judge.history.others.add("Lift2")
 
     assert verdict("lift", "B0.one", [senders("/a", "/b"), two_lifts, *uneven]) == "not seen"
+
+
+@pytest.mark.parametrize(
+    ("floor", "to", "found"), [("L3", "L3", "kept"), ("L3", "L1", "kept"), ("L1", "L1", "broken")]
+)
+def test_an_open_door_at_the_recall_floor_lets_in_only_a_robot_that_waits_there(
+    floor: str, to: str, found: str
+) -> None:
+    """The robot waits at `floor`. The lift is recalled to L1, and shows `to` as its destination."""
+    lines = [
+        *(*seconds(0.0, 3.0, car), *seconds(2.5, 20.0, lambda s: asks(s, floor=floor))),
+        *seconds(3.0, 6.0, lambda s: held(s, floor="L3" if floor == "L1" else "L1", to=floor)),
+        *seconds(6.0, 20.0, lambda s: held(s, to=to, mode=FIRE, door=OPEN)),
+    ]
+    assert verdict("lift", "L10.board", [*lines]) == found
 
 
 def test_every_law_has_its_stories() -> None:
