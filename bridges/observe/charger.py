@@ -5,6 +5,7 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import words
+from bridges.messages.stamps import in_seconds
 from bridges.observe.device import ObservedDevice, Wait
 from bridges.observe.limits import UNSEEN_S
 from bridges.observe.news import News
@@ -55,6 +56,7 @@ class ObservedCharger(ObservedDevice[d.ChargerState]):
                 robot = self.text(f"{message.fleet_name}/{message.robot_name}")
                 who = self.text(message.request_id)
                 one, new = self.requesters.ask(who, robot, moment, stands=True)
+                one.stands_s = in_seconds(message.start_timeout)
                 if new and one.times == 1:
                     yield News("asks", moment, one.who, requester=one)
             case d.ChargerCancel():

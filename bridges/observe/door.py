@@ -18,6 +18,9 @@ LISTS_NOT: Final = "does not list it"
 SUPERVISOR: Final = "door_supervisor"
 """The requester_id of RMF's supervisor (door_supervisor/Node.hpp) and of our supervisor on
 `door_requests`."""
+CROSSES_S: Final = 0.5
+"""The longest time (s) for which a CLOSE may be on its way. A CLOSE that comes so soon after a
+heartbeat may be older than the heartbeat."""
 
 
 def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
@@ -50,6 +53,8 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
 
     - `holders`: the requesters that the supervisor's heartbeat lists, and the time since when it lists
       each
+    - `forgotten`: the requesters that the supervisor has dropped although they sent no CLOSE, and the
+      time of that. A restart of the supervisor is the reason.
     - `asked`: the mode that the last request on `door_requests` asks for
     - `sender`: the sender of that request, who last repeated it at `asked_last`
     """
@@ -60,6 +65,7 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         super().__init__(name, began)
         self.mode = Fact("", began)
         self.holders: dict[str, Moment] = {}
+        self.forgotten: dict[str, Moment] = {}
         self.last_heartbeat: Moment | None = None
         self.asked: Fact | None = None
         self.asked_last = began
@@ -112,11 +118,31 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
                 self.asked = Fact(wants, moment)
             elif self.asked.say(wants, moment):
                 yield News("passed on", moment, who, wants)
+            if wants == CLOSED and who == SUPERVISOR:
+                yield from self._told_to_close(moment)
             return
+        self.forgotten.pop(who, None)
         one, new = self.requesters.ask(who, wants, moment, stands=self.is_silent(moment))
         one.stamp(moment, request.request_time)
         if new:
             yield News("asks", moment, who, requester=one)
+
+    def _told_to_close(self, moment: Moment) -> Iterator[News]:
+        """Drop the holders. A supervisor sends CLOSE only to a door without holders, but RMF's
+        supervisor sends a heartbeat only after an adapter's request (door_supervisor/Node.cpp)."""
+        last = self.last_heartbeat
+        if last is not None and moment.at - last.at > CROSSES_S:
+            for who in [*self.holders]:
+                yield self._drop(moment, who)
+
+    def _drop(self, moment: Moment, who: str) -> News:
+        """Drop a holder. If it sent no CLOSE, the supervisor has forgotten it."""
+        one, held_s = self.requesters.get(who), moment.at - self.holders.pop(who).at
+        if one is not None and one.wants == OPEN:
+            if len(self.forgotten) >= MOST_HOLDERS:
+                del self.forgotten[next(iter(self.forgotten))]
+            self.forgotten[who] = moment
+        return News("lost", moment, who, gap_s=held_s)
 
     def _hear_heartbeat(self, moment: Moment, heartbeat: d.SupervisorHeartbeat) -> Iterator[News]:
         first, self.last_heartbeat = self.last_heartbeat is None, moment
@@ -124,8 +150,9 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         seen = not first or moment.at - self.began.at > REQUESTER_SILENT_S
         since = Moment(moment.at, moment.wall, seen)
         for who in [who for who in self.holders if who not in found]:
-            yield News("lost", moment, who, gap_s=moment.at - self.holders.pop(who).at)
+            yield self._drop(moment, who)
         for who in found:
+            self.forgotten.pop(who, None)
             if who not in self.holders:
                 self.holders[who] = since
                 if seen:

@@ -33,8 +33,10 @@ class ObservedLift(ObservedDevice[d.LiftState]):
     - `adapters_heard`: Was a fleet adapter heard?
     - `supervisor`: the session in the supervisor's last request on `lift_requests`, or "" after an END
     - `supervisor_last`: the time of that request
+    - `granted_unheard`: Was a session granted before any message on `lift_requests` was heard?
     - `idle_ends`: the number of successive ENDs of one session while the lift showed another session.
       The tuple also has this session and the time of its last END.
+    - `hazard`: when the lift's present hazard began; None if there is no hazard
     - `taken_from`: the last session that sent no END, but lost the lift to another session
     """
 
@@ -51,6 +53,8 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         self.adapters_heard = False
         self.supervisor: Fact | None = None
         self.supervisor_last: Moment | None = None
+        self.granted_unheard = False
+        self.hazard: Moment | None = None
         self.taken_from = ""
         self.idle_ends: tuple[int, str, Moment] = (0, "", began)
 
@@ -85,8 +89,19 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         """Yield a `Wait` for each requester to which the lift's states do not yet show what it
         wants."""
         for one in self.asking(now):
-            if self.is_silent(now) or not self.matches(one):
+            if self.is_silent(now) or not self.is_served(one):
                 yield Wait(one.who, one.wants, one.lacks)
+
+    def is_served(self, one: DeviceRequester) -> bool:
+        """Return whether the requester has what it wants. A session in HUMAN mode waits for nothing
+        more, because people call the lift."""
+        return self.matches(one) or (one.human and one.who == self.session.value)
+
+    @property
+    def unrecorded(self) -> bool:
+        """Return whether `lift_requests` cannot be heard: nothing came on this topic, though a session
+        was granted. Such a recording does not contain the topic."""
+        return self.granted_unheard and self.supervisor_last is None
 
     def not_passed_on(self, now: Moment) -> DeviceRequester | None:
         """Return a robot whose requests RMF's supervisor does not forward to the lift. The robot
@@ -95,13 +110,11 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         If a robot has the lift, only this robot counts, because RMF's supervisor drops the requests of
         all other robots (lift_supervisor/Node.cpp). If the lift is free, any robot counts.
 
-        Return None if a robot got the lift and no message ever came on `lift_requests`. In that case
-        the recording does not contain that topic.
+        Return None if `lift_requests` is unrecorded.
         """
         silent_at, holder = now.at - REQUESTER_SILENT_S, self.session.value
         last = self.supervisor_last
-        unrecorded = last is None and holder != NOBODY and self.session.since.seen
-        if unrecorded or (last is not None and last.at > silent_at):
+        if self.unrecorded or (last is not None and last.at > silent_at):
             return None
         asks = (
             one
@@ -131,6 +144,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             return
         wants, stands = self.text(message.destination_floor), self.is_silent(moment)
         one, new = self.requesters.ask(who, wants, moment, keep=self.session.value, stands=stands)
+        one.human = message.request_type == d.LiftRequestType.REQUEST_HUMAN_MODE
         one.own = one.own or not passed_on
         one.passed_on = moment if passed_on else one.passed_on
         one.stamp(moment, message.request_time)
@@ -180,6 +194,8 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             yield from self._changed_hands(moment)
         if self.changed and self.before is not None:
             yield News("changed", moment)
+        hazardous = self.state is not None and self.state.current_mode in HAZARDS
+        self.hazard = (self.hazard or moment) if hazardous else None
         for one in self.requesters:
             if one.ended is None and self.matches(one):
                 one.lacks = moment
@@ -209,6 +225,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             if old is not None:
                 yield self._over(moment, old)
         if holder != NOBODY and not first:
+            self.granted_unheard |= self.supervisor_last is None
             yield News("has", moment, holder, requester=new)
         if new is not None and holder != NOBODY:
             new.granted = moment

@@ -67,6 +67,8 @@ class DeviceRequester:
     - `reached`: the last fulfilled wish
     - `given_up`: the wish before the present wish, if it was not fulfilled
     - `end_passed_on`: Has the supervisor sent END to the device?
+    - `human`: Does the present wish ask for a lift's HUMAN mode?
+    - `stands_s`: the time (s) for which a request for a charger stands, although nobody repeats it
     - `gone`: Has the requester stopped asking without END?
     - `times`: the number of requests
     - `own`: Was a message of the requester itself heard, and not only the supervisor's messages?
@@ -92,13 +94,16 @@ class DeviceRequester:
     ended: Moment | None = None
     end_last: Moment | None = None
     end_passed_on: bool = False
+    human: bool = False
+    stands_s: float = 0.0
     gone: bool = False
     stamped: bool = False
     stamp_age_s: float = 0.0
 
     def asks(self, now: Moment) -> bool:
-        """Return whether the requester still repeats its request."""
-        return self.ended is None and now.at - self.last.at <= REQUESTER_SILENT_S
+        """Return whether the requester still repeats its request, or its request still stands."""
+        lasts_s = max(self.stands_s, REQUESTER_SILENT_S)
+        return self.ended is None and now.at - self.last.at <= lasts_s
 
     def ends(self, now: Moment) -> bool:
         """Return whether the requester still repeats END."""

@@ -17,7 +17,7 @@ RED, BLUE = "fleet/red", "fleet/blue"
 LIFT = d.LiftState(lift_name="Lift1", available_floors=("L1", "L2"), current_floor="L1")
 DOOR = d.DoorState(door_name="ward")
 CHARGER = d.ChargerState(charger_name="bay", state=1)
-END, AGV = 0, 1
+END, AGV, HUMAN = 0, 1, 2
 OPEN, CLOSED = 2, 0
 
 

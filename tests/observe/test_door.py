@@ -29,6 +29,56 @@ def missing(door: ObservedDoor, one: DeviceRequester) -> list[str]:
     return [f"{check.name}: {check.shown}" for check in door.checks(one) if not check.met]
 
 
+def held_by_red(story: Story) -> Story:
+    """Let red hold the open door. Red drives through, and says nothing more."""
+    return story.door(OPEN).passes(4).asks_door(RED).lists(RED).passes(1).door(OPEN).passes(4)
+
+
+def holders(story: Story) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the holders and the forgotten requesters, with the times since when."""
+    door = story.device("door", "ward")
+    assert isinstance(door, ObservedDoor)
+    return (
+        {who: since.at for who, since in door.holders.items()},
+        {who: since.at for who, since in door.forgotten.items()},
+    )
+
+
+def test_a_close_from_the_supervisor_shows_that_a_restart_has_lost_the_holders() -> None:
+    story = held_by_red(Story())
+    assert holders(story) == ({RED: 4}, {})
+    story.asks_door("door_supervisor", CLOSED, "door_requests")
+    assert holders(story) == ({}, {RED: 9})
+    assert holders(story.passes(1).asks_door(RED).lists(RED)) == ({RED: 10}, {})
+
+
+def test_a_holder_that_a_heartbeat_drops_without_close_is_forgotten_until_it_sends_close() -> None:
+    story = held_by_red(Story()).asks_door(BLUE).lists(BLUE)
+    assert holders(story) == ({BLUE: 9}, {RED: 9})
+    assert holders(story.passes(1).asks_door(RED, CLOSED)) == ({BLUE: 9}, {})
+
+
+def test_a_holder_that_sends_close_is_not_forgotten() -> None:
+    story = held_by_red(Story()).asks_door(RED, CLOSED)
+    story.asks_door("door_supervisor", CLOSED, "door_requests").lists()
+    assert holders(story) == ({}, {})
+
+
+def test_a_close_of_somebody_else_or_a_late_one_takes_no_holder_away() -> None:
+    story = held_by_red(Story()).asks_door("rmf_bridge_send", CLOSED, "door_requests")
+    story.passes(1).asks_door(BLUE).lists(RED, BLUE).passes(0.1)
+    story.asks_door("door_supervisor", CLOSED, "door_requests")
+    assert holders(story) == ({RED: 4, BLUE: 10}, {})
+
+
+def test_forgotten_requesters_are_bounded() -> None:
+    story = Story().door(CLOSED)
+    for n in range(2 * MOST_HOLDERS):
+        story.passes(1).asks_door(f"made/up{n}").lists(f"made/up{n}")
+    held, forgotten = holders(story.lists())
+    assert (len(held), len(forgotten)) == (0, MOST_HOLDERS)
+
+
 def test_the_phase_door_open_waits_for_the_door_and_then_for_the_heartbeat() -> None:
     story = Story().door(CLOSED).asks_door(RED)
     door = story.device("door", "ward")

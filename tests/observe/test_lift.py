@@ -6,7 +6,7 @@ import pytest
 from bridges.observe.lift import ObservedLift, request_lift
 from bridges.observe.limits import GIVEN_UP_S, MOST_REQUESTERS, REQUESTER_SILENT_S, SILENT_S
 from bridges.observe.requesters import Moment
-from tests.observe.story import BLUE, CLOSED, OPEN, RED, Story
+from tests.observe.story import AGV, BLUE, CLOSED, HUMAN, OPEN, RED, Story
 
 
 def test_a_ride_from_its_request_to_its_end() -> None:
@@ -51,6 +51,13 @@ def test_a_requester_waits_until_its_request_is_shown_and_again_afterwards() -> 
     assert story.waits("lift", "Lift1") == [(RED, "L2", 2)]
     story.passes(1).ends(RED)
     assert story.waits("lift", "Lift1") == []
+
+
+def test_a_session_in_human_mode_waits_for_nothing_more() -> None:
+    story = Story().lift().asks("dashboard", "L2", HUMAN).lift()
+    assert story.waits("lift", "Lift1") == [("dashboard", "L2", 0)]
+    assert story.lift("dashboard").waits("lift", "Lift1") == []
+    assert story.asks("dashboard", "L2", AGV).waits("lift", "Lift1") == [("dashboard", "L2", 0)]
 
 
 def test_a_requester_that_stops_asking_during_states_waits_no_longer() -> None:
@@ -151,6 +158,11 @@ def test_a_grant_without_a_request_of_the_supervisor_shows_an_unrecorded_topic()
     for _ in range(9):
         story.lift(RED).passes(1).asks(RED)
     assert not_passed_on(story) == ""
+    story.ends(RED).lift()
+    for _ in range(9):
+        story.lift().passes(1).asks(BLUE)
+    assert not_passed_on(story) == ""
+    assert not_passed_on(story.asks(RED, passed=True).passes(5).asks(BLUE).lift()) == BLUE
 
 
 def test_only_an_abandoned_wish_is_remembered() -> None:

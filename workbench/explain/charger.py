@@ -15,6 +15,8 @@ from bridges.kinds.charger.report import STATION_NEXT, FaultCause, diagnosis
 from bridges.kinds.charger_coordinator import reasons
 from bridges.observe.charger import NOBODY
 from bridges.observe.diagnosis import Diagnosis
+from bridges.observe.limits import REQUESTER_SILENT_S
+from bridges.observe.requesters import DeviceRequester
 from workbench.explain import answer as common
 from workbench.explain import first_causes
 from workbench.explain.answer import Answer
@@ -121,6 +123,7 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         one
         for one in charger.requesters
         if one.ended is None and one.granted is None and one.asks(clock.now)
+        if not _is_refused(charger, one, clock)
     ]
     if not asking:
         found.say("Nobody requests the charger.", "nobody", "there is nothing to do")
@@ -132,6 +135,14 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         "the device's node",
         "take the request; if the node refuses the request, the reason is below or in the node's log",
     )
+
+
+def _is_refused(charger: ChargerFacts, one: DeviceRequester, clock: TimePhrases) -> bool:
+    """Return whether the charger's daemon has refused this request, so that nobody waits for it."""
+    told = charger.refusal
+    by_name = told is not None and told.request == one.who and told.at.at >= one.last.at
+    later = clock.now.at - one.last.at > REQUESTER_SILENT_S
+    return later and (by_name or bool(charger.refusals(clock.now, one.last.at)))
 
 
 def _error(found: Answer, charger: ChargerFacts) -> None:

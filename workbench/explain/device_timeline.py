@@ -18,7 +18,8 @@ from bridges.messages.heard import Heard, Own
 from bridges.messages.words import Kind
 from bridges.observe.device import reading_age
 from bridges.observe.diagnosis import Diagnosis, about, report
-from bridges.observe.door import listed
+from bridges.observe.door import CROSSES_S, listed
+from bridges.observe.door import SUPERVISOR as DOOR_SUPERVISOR
 from bridges.observe.limits import MOST_NODES, REQUESTER_SILENT_S, STEP_S
 from bridges.observe.requesters import Moment
 from workbench.explain.noted import levels, noted
@@ -74,6 +75,7 @@ class Drawing:
         self._left_out = 0
         self._noted: set[str] = set()
         self._destination = ""
+        self._heartbeat_at = float("-inf")
         self._on: dict[tuple[str, str], str] = {}
         self._said: dict[str, Diagnosis] = {}
 
@@ -224,12 +226,15 @@ class Drawing:
                 ends = message.requested_mode.value != d.DoorModeValue.MODE_OPEN
                 passed_on, who = topic == "door_requests", message.requester_id
                 text = words.plain(d.DoorModeValue, message.requested_mode.value)
+                late = self._now - self._heartbeat_at > CROSSES_S
+                if passed_on and ends and who == DOOR_SUPERVISOR and late:
+                    self._hold(set())
             case d.ChargerRequest():
                 ends, passed_on = False, False
                 who, text = f"{message.fleet_name}/{message.robot_name}", message.request_id
             case d.ChargerCancel():
                 ends, passed_on, who, text = True, False, "cancel", message.request_id
-        if passed_on and who != "door_supervisor":
+        if passed_on and who != DOOR_SUPERVISOR:
             text = f"{text} for {who}"
         row = self._row("requests", SUPERVISOR if passed_on else who)
         once = isinstance(message, d.ChargerRequest | d.ChargerCancel)
@@ -247,9 +252,12 @@ class Drawing:
         """Fill a row for each session in the door supervisor's heartbeat.
 
         RMF's own supervisor sends a heartbeat only after requests. Therefore a session lasts until a
-        heartbeat omits the session.
+        heartbeat omits the session, or the supervisor sends CLOSE.
         """
-        holders = set(map(label, listed(message, self._device)))
+        self._heartbeat_at = self._now
+        self._hold(set(map(label, listed(message, self._device))))
+
+    def _hold(self, holders: set[str]) -> None:
         for who in holders:
             self._row("sessions", who, keeps_s=float("inf")).say(self._now, who, "held")
         for who, row in self._rows["sessions"].items():

@@ -55,6 +55,7 @@ def answer(
     if door.last_heartbeat is None:
         held = " No heartbeat of a door supervisor was heard." if door.hears_lists else ""
     found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}.{held}")
+    _forgotten(found, door, clock)
     if len(door.flaps(clock.now)) < FLAPS and (old := common.old_reading(door, clock)):
         found.say(old)
     held_open = door.holders or claim or (door.asked and door.asked.value == OPEN)
@@ -87,6 +88,7 @@ def _in_question(door: DoorFacts, clock: TimePhrases, focus: str) -> DeviceReque
 def _begins(door: DoorFacts, claim: DeviceRequester | None) -> float:
     starts = [claim.since.at] if claim else []
     starts += [since.at - SETTLES_S for since in door.holders.values()]
+    starts += [since.at - LONG_S for since in door.forgotten.values()]
     return min(starts, default=float("-inf"))
 
 
@@ -109,6 +111,16 @@ def _fields(
     return tuple(
         CheckedField(*check, clock.since(told[check.name])) for check in door.checks(claim)
     )
+
+
+def _forgotten(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
+    """Name the requesters for which the supervisor no longer keeps the door open."""
+    for who, since in [*door.forgotten.items()][:4]:
+        found.say(
+            f"{who} held the door and sent no CLOSE, but the supervisor dropped it at"
+            f" {clock.time(since.wall)}. The supervisor has most likely restarted and forgotten {who},"
+            " which may stand in the doorway."
+        )
 
 
 # ---- a requester waits
@@ -199,7 +211,14 @@ def _nobody_asks(
 ) -> None:
     asked = door.asked.value if door.asked else ""
     for_s = clock.now.at - door.mode.since.at
-    if door.holders and (door.mode.value == OPEN or asked == CLOSED):
+    if door.forgotten and not door.holders:
+        who = next(iter(door.forgotten))
+        found.acts(
+            "a person",
+            f"look into the doorway of {door.name}; while {who} stands in it: `rmf-bridge send door"
+            f" {quote(door.name)} open --requester {quote(who)}`",
+        )
+    elif door.holders and (door.mode.value == OPEN or asked == CLOSED):
         _held_open(found, door, clock)
     elif door.last_heartbeat is None and asked == OPEN:
         _asked_open(found, door, clock)

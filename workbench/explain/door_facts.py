@@ -42,6 +42,8 @@ class DoorFacts(Device, ObservedDoor):
                 return f"{self.asked_by} asks for {one.text}"
             case "asks" if by and (by.wants == OPEN or who in self.holders):
                 return f"{who} asks for the door to be {by.wants}"
+            case "lost" if who in self.forgotten:
+                return f"the supervisor has forgotten {who}, from whom no CLOSE was heard"
             case "lost":
                 return f"the supervisor no longer lists {who}, after a hold of {lasted(one.gap_s)}"
             case "has":

@@ -49,13 +49,13 @@ def answer(
     if focus and claim is None:
         told = "its last ride is shown below" if lift.kept else "no request from it was heard"
         found.say(f"{label(focus)} does not have {lift.name} and does not request it now: {told}.")
-    if claim is not None and claim.ended is None and not lift.matches(claim):
+    if claim is not None and claim.ended is None and not lift.is_served(claim):
         where = claim.wants or "no floor"
         found.say(f"{claim.who} has waited {clock.since(claim.since)} for {lift.name} at {where}.")
     _hold(found, lift, clock)
     if len(lift.flaps(clock.now)) < FLAPS and (old := common.old_reading(lift, clock)):
         found.say(old)
-    if claim is not None and claim.ended is None:
+    if claim is not None and claim.ended is None and not claim.human:
         found.asks, found.fields = claim.who, _fields(lift, claim, clock)
         found.notes += common.clock_of(claim)
     _why(found, lift, claim, clock, around)
@@ -85,10 +85,10 @@ def _why(
         kept = lift.session.value != NOBODY
         found.say(
             f"The lift has been in OFFLINE mode {clock.since(lift.mode.since)}: it is out of service or"
-            f" cannot be read, and takes no robot.{f' {lift.keeps(clock.now)}' if kept else ''}",
-            "a person",
-            "find out why it is out of service, or cannot be read",
+            f" cannot be read, and takes no robot.{f' {lift.keeps(clock.now)}' if kept else ''}"
         )
+        _lets_in(found, lift, clock)
+        found.acts("a person", "find out why it is out of service, or cannot be read")
     elif silent is not None and (silent.ended or silent.wants in (lift.floors or silent.wants)):
         not_passed_on(found, lift, silent, clock, around)
     elif lift.session.value != NOBODY:
@@ -107,7 +107,7 @@ def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceReque
     """
     if focus:
         return lift.requesters.get(focus)
-    waiting = [one for one in lift.asking(clock.now) if not lift.matches(one)]
+    waiting = [one for one in lift.asking(clock.now) if not lift.is_served(one)]
     if waiting:
         return min(waiting, key=lambda one: one.since.at)
     return lift.requesters.get(lift.session.value)
@@ -172,7 +172,7 @@ def _others_wait(
     others = [
         one
         for one in lift.asking(clock.now)
-        if one is not claim and one.who != lift.session.value and not lift.matches(one)
+        if one is not claim and one.who != lift.session.value and not lift.is_served(one)
     ]
     texts = [f"{one.who} at {one.wants} {clock.since(one.since)}" for one in others[:4]]
     if texts:
@@ -203,6 +203,8 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
         found.acts("the controller", ends)
         return
     found.say(lift.keeps(clock.now))
+    if _lets_in(found, lift, clock):
+        return
     theirs = lift.requesters.get(holder)
     stands = lift.door.value == "open" and clock.now.at - lift.door.since.at > STANDS_S
     if mode != "FIRE" or not stands or theirs is None or not theirs.asks(clock.now):
@@ -223,6 +225,33 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
         )
 
 
+def _lets_in(found: Answer, lift: LiftFacts, clock: TimePhrases) -> bool:
+    """Return whether RMF lets the holder drive in during the hazard, and say so. RMF ignores the mode,
+    so a robot outside the car drives in as soon as session, floor and door match."""
+    who, floor, mode = lift.session.value, lift.floor.value, lift.mode.value
+    theirs, hazard = lift.requesters.get(who), lift.hazard
+    if theirs is None or hazard is None or theirs.ended or not lift.matches(theirs):
+        return False
+    boarded = theirs.boarded is not None and theirs.boarded.at < hazard.at
+    if boarded or lift.told("boarded", clock.now) == "yes":
+        return False
+    if theirs.first.seen and hazard.seen:
+        found.say(
+            f"But the door is open at {floor}, so RMF lets {who} drive in now. {who} was not let in"
+            f" before the lift went into {mode} mode: it is outside, or has driven in since.",
+            "a person",
+            f"keep {who} out of the car, and look whether it has driven in",
+        )
+        return True
+    found.say(
+        f"But the door is open at {floor}. If {who} is outside the car, RMF lets {who} drive in now;"
+        f" whether {who} was in the car before {mode} mode is not known.",
+        "a person",
+        f"look where {who} is: keep it out of the car, or let it drive out",
+    )
+    return True
+
+
 def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
     """Explain a lift that somebody holds. Tell why the holder waits, or why the holder does not release
     the lift."""
@@ -230,6 +259,8 @@ def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.Oth
     theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
         lift_holder.end_not_obeyed(found, lift, theirs, clock)
+    elif theirs and theirs.human and (lift.mode.value == "HUMAN" or not lift.matches(theirs)):
+        lift_holder.has_human_mode(found, lift, theirs, clock)
     elif theirs is None or not theirs.asks(clock.now):
         lift_holder.without_word(found, lift, clock, around)
     elif lift.matches(theirs):

@@ -13,6 +13,7 @@ from workbench.explain.explanation import StoryLine
 from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
 
+HUMAN: Final = d.LiftRequestType.REQUEST_HUMAN_MODE
 DIRECT: Final = "the supervisor, or a person with `send --direct`,"
 """The likely sender of a request on `lift_requests`, if no fleet adapter was heard to send the same
 request."""
@@ -80,7 +81,7 @@ class LiftFacts(Device, ObservedLift):
         asked = Moment(now.at - max(0.0, now.wall - wall), min(wall, now.wall), seen=False)
         wants = self.text(request.destination_floor)
         one, _ = self.requesters.ask(who, wants, asked, stands=True)
-        one.own = True
+        one.own, one.human = True, request.request_type == HUMAN
         if one.times > 1 and one.given_up:
             one.boarded = asked  # a robot asks for a second floor only from inside the car
 

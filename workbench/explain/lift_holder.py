@@ -101,6 +101,21 @@ def _robots(found: list[str], fleet: str) -> list[str]:
     return robots[:4] or ([f"the rest of {fleet}"] if found else [])
 
 
+def has_human_mode(
+    found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
+) -> None:
+    """Explain a session in HUMAN mode. It keeps the lift for people, and waits for nothing. A fleet
+    adapter never asks for this mode."""
+    number = " Its fleet adapter may mean AGV_MODE, which is 1 in a request and 2 in a state."
+    found.say(
+        f"{claim.who} has asked for HUMAN mode: people call the lift, and no robot gets it until"
+        f" {claim.who} sends END.{number if '/' in claim.who else ''}"
+        f" {lift.in_car(claim.who, clock.now)}",
+        "a person",
+        f"let {claim.who} send END; if it cannot, and the car is empty: {release(lift)}",
+    )
+
+
 def end_not_obeyed(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> None:
@@ -118,6 +133,14 @@ def end_not_obeyed(
             f"{claim.who} sent END at {at}, and the supervisor has not passed it on.",
             "the supervisor",
             f"pass on END of {claim.who}; the supervisor's log says why it does not",
+        )
+    elif claim.own and not claim.end_passed_on:
+        found.say(
+            f"{claim.who} sent END at {at}, and the lift still shows its session. Nothing was heard on"
+            " `lift_requests`, so it is not known whether the supervisor passed the END on.",
+            "a person",
+            f"see in the log of the lift's node whether it has the END of {claim.who}; until the"
+            f" session ends, when the car is empty: {release(lift)}",
         )
     else:
         found.say(

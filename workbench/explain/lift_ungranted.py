@@ -13,6 +13,9 @@ from workbench.explain.phrases import TimePhrases, lasted
 SETTLES_S: Final = 2.0
 """Normal time (s) from a request until the lift grants the session. After a session has ended, the
 supervisor needs the same time to turn to the next session."""
+UNRECORDED: Final = (
+    "The lift was given to a robot, but nothing was heard on `lift_requests`: this topic is missing"
+)
 
 
 def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
@@ -28,7 +31,7 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
         found.say("The request came a moment ago.", "the device's node", "grant the session")
         return
-    if _asks_for_another(found, lift, claim, clock):
+    if not lift.unrecorded and _asks_for_another(found, lift, claim, clock):
         return
     reasons = lift.refusals(clock.now, max(claim.since.at, clock.now.at - 10.0))
     if reasons:
@@ -36,6 +39,13 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
             f"The lift's daemon refuses the request: {', '.join(reasons)}.",
             "the device's node",
             "grant the session when this reason is gone; the node's log has the details",
+        )
+    elif lift.unrecorded:
+        found.say(
+            f"{UNRECORDED}. So it is not known whether the supervisor passes the request on, or the"
+            " lift's node does not grant it.",
+            "a person",
+            "see whether the log of the lift's node has the request, and record `/lift_requests` too",
         )
     else:
         found.say(

@@ -3,7 +3,7 @@ these lifts and doors."""
 
 from collections import deque
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from bridges.messages import definitions as d
@@ -23,6 +23,11 @@ heard. Lost messages cannot explain so many states without a request."""
 ALARMS_S: Final = 60.0
 """Time (s) after the start or end of an alarm in which robots may change their route."""
 BACK_S: Final = 0.5
+AGAIN: Final = 2
+"""Number of breaches in a row that count. A restart of the adapter or a step of its clock may explain
+one breach, but not so many."""
+SPAM: Final = 5
+"""Number of needless ENDs that is a breach, if they come at the pace of the lift's states."""
 ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name)
 
 
@@ -38,7 +43,7 @@ class Wish(DeviceRequester):
     - `ignored`: number of states in a row without a request by the robot, although its fleet was heard.
     - `ignored_since`: when the first of these states came.
     - `lapsed`: whether the adapter sent the first request only once, and then ignored IGNORED states.
-    - `spare`: number of ENDs after the last state that showed the robot's session.
+    - `spare`: times of the latest ENDs after the last state that showed the robot's session.
     - `passed`: whether the robot asked for another door before it sent CLOSE for this door.
     - `visits`: the kind of device and the robot's name, as a key for `AdapterHistory.lapses`.
     """
@@ -50,7 +55,7 @@ class Wish(DeviceRequester):
     ignored: int = 0
     ignored_since: float = NOT_YET
     lapsed: bool = False
-    spare: int = 0
+    spare: deque[float] = field(default_factory=lambda: deque(maxlen=SPAM))
     passed: bool = False
 
     visits: str = ""
@@ -64,14 +69,19 @@ class Wish(DeviceRequester):
 class AdapterHistory(AnyHistory):
     """The history of one fleet adapter. A visit is a robot's use of one device (`Wish`).
 
+    Other nodes also send END for a fleet's robots: rmf-web does so for every known robot (rmf-web
+    PR#808), and `rmf-bridge release` for the holder. Therefore only requests of the fleet's adapter
+    count, if the wire names the publishers. The adapter has asked for a robot's lift or door. If one of
+    several such nodes also publishes the fleet's states, this node is the adapter.
+
     - `name`: a fleet, or fleet/robot.
     - `device`: the device that the latest request names.
     - `wish`: the visit to which the latest request belongs.
     - `was`: a copy of this visit from before the request.
     - `stated`: the visits to the device that published the latest state.
-    - `listed`: the robots in the fleet's states.
+    - `listed`: the robots in the fleet's states. `present`: the robots in the latest of these states.
     - `lists`: number of fleet states heard.
-    - `back`: robot -> how often the stamp of a request was older than the stamp before.
+    - `back`: when the stamps of the latest request's kind and robot last went back (AGAIN times).
     - `lapses`: `Wish.visits` -> number of waits in a row in which the adapter sent only one request.
     - `unclosed`: robot -> number of passages in a row without CLOSE.
     """
@@ -85,12 +95,16 @@ class AdapterHistory(AnyHistory):
         self.was: Wish | None = None
         self.stated: list[Wish] = []
         self.listed: set[str] = set()
+        self.present: set[str] = set()
         self.lists = 0
         self.stamped = self.stepped = False
-        self.back: dict[str, int] = {}
+        self.back: deque[float] = deque(maxlen=AGAIN)
+        self._backs: dict[str, deque[float]] = {}
         self.lapses: dict[str, int] = {}
         self.unclosed: dict[str, int] = {}
         self._wishes: dict[str, Wish] = {}
+        self._asking: dict[str, None] = {}
+        self._stating: dict[str, None] = {}
         self._tasks: dict[str, tuple[str, float]] = {}
         self._stamps: dict[str, tuple[float, deque[d.Message]]] = {}
         self._alarm: d.Message = d.Bool(False)
@@ -105,9 +119,14 @@ class AdapterHistory(AnyHistory):
         self.stated = []
         message, moment = heard.message, Moment(heard.at, heard.wall)
         if isinstance(message, d.LiftRequest | d.DoorRequest):
-            if heard.topic in ADAPTERS and self._is_replayed(message):
+            if heard.topic in ADAPTERS and (
+                self._is_of_another(heard, message) or self._is_replayed(message)
+            ):
                 return False
-        elif not isinstance(message, d.FleetState):
+        elif isinstance(message, d.FleetState):
+            if heard.sender and heard.sender.node and message.name == self.fleet:
+                keep(self._stating, heard.sender.node, None)
+        else:
             self._other_at = heard.at
         found = [device for device, _ in self.graph.hear(heard)]
         match message:
@@ -150,6 +169,7 @@ class AdapterHistory(AnyHistory):
         if fleet.name != self.fleet:
             return
         self.lists, self._alive_at = self.lists + 1, self.now
+        self.present = {f"{fleet.name}/{robot.name}" for robot in fleet.robots}
         for robot in fleet.robots:
             who = f"{fleet.name}/{robot.name}"
             if len(self.listed) < REMEMBERED:
@@ -159,11 +179,19 @@ class AdapterHistory(AnyHistory):
 
     # ---- requests
 
+    def _is_of_another(self, heard: Heard, message: d.LiftRequest | d.DoorRequest) -> bool:
+        """Return whether another node than the fleet's adapter sent this request. Without a name of the
+        publisher nobody knows."""
+        node = heard.sender.node if heard.sender else ""
+        if node and self.is_ours(_who(message)) and not _ends(message):
+            keep(self._asking, node, None)
+        adapters = self._asking.keys() & self._stating.keys() or self._asking.keys()
+        return bool(node and adapters) and node not in adapters
+
     def _is_replayed(self, message: d.LiftRequest | d.DoorRequest) -> bool:
         """Return whether this is an old message that its publisher retained for late listeners.
         Otherwise remember the message's stamp."""
-        who = message.session_id if isinstance(message, d.LiftRequest) else message.requester_id
-        key, at = f"{words.kind(message)} {who}", in_seconds(message.request_time)
+        key, at = f"{words.kind(message)} {_who(message)}", in_seconds(message.request_time)
         newest, recent = self._stamps.get(key, (0.0, deque(maxlen=100)))
         older = 0.0 < at < newest - BACK_S
         again = 0.0 < at < newest and message in recent
@@ -171,22 +199,22 @@ class AdapterHistory(AnyHistory):
             return True
         recent.append(message)
         self.stamped, self.stepped = at > 0.0, older
+        if isinstance(message, d.LiftRequest) and _ends(message):
+            self.stamped, at = False, newest  # perhaps of another node, with another clock
         if at > 0.0:
             keep(self._stamps, key, (at, recent))
-        if older:
-            keep(self.back, who, self.back.get(who, 0) + 1)
+        self.back = self._backs.get(key) or deque(maxlen=AGAIN)
+        if older and self.stamped:
+            self.back.append(self.now)
+            keep(self._backs, key, self.back)
         return False
 
     def _ask(self, device: AnyDevice, message: d.LiftRequest | d.DoorRequest, now: Moment) -> bool:
+        who, ends = _who(message), _ends(message)
         if isinstance(message, d.LiftRequest):
-            who, wants = message.session_id, message.destination_floor
-            ends = message.request_type == END
+            wants = message.destination_floor
         else:
-            who, wants = (
-                message.requester_id,
-                words.plain(d.DoorModeValue, message.requested_mode.value),
-            )
-            ends = wants == "closed"
+            wants = words.plain(d.DoorModeValue, message.requested_mode.value)
         if not self.is_ours(who):
             fleet = who.partition("/")[0]
             if fleet != self.fleet and len(self.others) < REMEMBERED:
@@ -218,7 +246,7 @@ class AdapterHistory(AnyHistory):
         """Update the visit after a request. `wants` is empty for END and CLOSE."""
         if not wants:
             wish.ended = wish.ended or now
-            wish.spare += 1
+            wish.spare.append(now.at)
             if isinstance(self.device, ObservedDoor):
                 self.unclosed[wish.who] = 0
         elif wants != wish.wants:
@@ -262,15 +290,17 @@ class AdapterHistory(AnyHistory):
         for wish in self.stated:
             self._count(wish, before)
             if _holds(device, wish.who):
-                wish.held_at, wish.spare = self.now, 0
+                wish.held_at = self.now
+                wish.spare.clear()
             elif wish.held_at > NOT_YET and self.now - wish.last.at > REQUESTER_SILENT_S:
                 wish.ended = wish.ended or now  # we must have missed the END
         self._meet(device, now)
         return bool(self.stated)
 
     def _count(self, wish: Wish, before: float) -> None:
-        """If the robot has sent no request since the previous state, count that state as ignored."""
-        if wish.last.at >= before:
+        """If the robot has sent no request since the previous state, count that state as ignored. A
+        restarted adapter knows nothing of a robot that its fleet's states do not list."""
+        if wish.last.at >= before or (self.lists and wish.who not in self.present):
             wish.ignored = 0
         elif self._alive_at > before:
             wish.ignored_since = wish.ignored_since if wish.ignored else before
@@ -284,6 +314,17 @@ class AdapterHistory(AnyHistory):
         for wish in self._of(device):
             if wish.met is None and not wish.ended and device.matches(wish):
                 wish.met = now
+
+
+def _who(message: d.LiftRequest | d.DoorRequest) -> str:
+    return message.session_id if isinstance(message, d.LiftRequest) else message.requester_id
+
+
+def _ends(message: d.LiftRequest | d.DoorRequest) -> bool:
+    """Return whether this is END or CLOSE."""
+    if isinstance(message, d.LiftRequest):
+        return message.request_type == END
+    return message.requested_mode.value == d.DoorModeValue.MODE_CLOSED
 
 
 def _holds(device: AnyDevice, who: str) -> bool:

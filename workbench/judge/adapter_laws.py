@@ -11,8 +11,8 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.observe.lift import ObservedLift
 from bridges.observe.limits import REQUESTER_SILENT_S, SLOWEST_S
-from workbench.judge.adapter_history import AdapterHistory, Wish
-from workbench.judge.history import NOT_YET
+from workbench.judge.adapter_history import AGAIN, SPAM, AdapterHistory, Wish
+from workbench.judge.history import NOT_YET, OFTEN_S
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
 
 CONTEXT: Final = "rmf_ros2 agv/RobotContext.cpp:1700-1735"
@@ -21,10 +21,9 @@ DOOR_OPEN: Final = "rmf_ros2 phases/DoorOpen.cpp"
 NEVER_ENDS_S: Final = 60.0
 """Time (s) of silence after which a robot can no longer be on its way out of a car."""
 FOR_EVER_S: Final = 60.0
-AGAIN: Final = 2
-"""Number of breaches in a row that count. A restart of the adapter may explain one breach, but not so
-many."""
-SPAM: Final = 5
+SPAM_S: Final = 10.0
+"""The longest time (s) for SPAM needless ENDs at the pace of the states. A person's presses of a button
+are slower."""
 LISTS: Final = 5
 TASKS_S: Final = 3.0
 """Maximum delay (s) from a new task to the fleet state that shows the task."""
@@ -47,7 +46,7 @@ def _numbers(history: AdapterHistory) -> Finding:
 
 
 def _one_id(history: AdapterHistory) -> Finding:
-    if history.wish is None or history.lists < LISTS:
+    if history.wish is None or history.lists < LISTS or history.wish.ended:
         return None
     who = history.wish.who
     return KEPT if who in history.listed else f"{shown(who)} is no robot in fleet_states"
@@ -58,8 +57,8 @@ def _stamps(history: AdapterHistory) -> Finding:
         return None
     if not history.stepped:
         return KEPT
-    back = history.back[history.wish.who]
-    return f"its stamps went back {back} times" if back >= AGAIN else None
+    again = history.often(history.back)
+    return f"its stamps went back {AGAIN} times within {OFTEN_S:.0f} s" if again else None
 
 
 def _floors(history: AdapterHistory) -> Finding:
@@ -154,7 +153,7 @@ def _ends_again(history: AdapterHistory) -> Finding:
     wish, was = history.wish, history.was
     if wish is not None and isinstance(history.device, ObservedLift):
         again = was is not None and was.ended is not None and wish.ended is was.ended
-        return KEPT if again and wish.spare == 1 else None
+        return KEPT if again and len(wish.spare) == 1 else None
     for one in _holders(history):
         silent_s = one.ignored_s(history.now)
         if one.ended and silent_s > SLOWEST_S:
@@ -174,10 +173,12 @@ def _stops_ending(history: AdapterHistory) -> Finding:
     wish = history.wish
     if wish is not None and wish.ended and isinstance(history.device, ObservedLift):
         late_s = history.now - max(wish.ended.at, wish.held_at)
-        if wish.spare < SPAM or late_s < SLOWEST_S or history.device.state is None:
+        spare_s = history.now - wish.spare[0] if len(wish.spare) == SPAM else SPAM_S
+        if spare_s >= SPAM_S or late_s < SLOWEST_S or history.device.state is None:
             return None
         return (
-            f"{wish.spare} ENDs after its session had ended (a defect of RMF: rmf_ros2#382, #415)"
+            f"{SPAM} ENDs within {spare_s:.1f} s, after its session had ended (a defect of RMF:"
+            " rmf_ros2#382, #415)"
         )
     for one in history.stated:
         silent = history.now - one.last.at > REQUESTER_SILENT_S
@@ -226,14 +227,15 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A7.id",
         "Each robot has one id, fleet/robot, for lifts and doors",
-        "a request after 5 fleet_states of the fleet",
+        "a request (not END) after 5 fleet_states of the fleet",
         "A lift knows a robot by its session's name. With a second name, the robot is a stranger",
         "rmf_ros2 agv/RobotContext.cpp:1425",
         _one_id,
     ),
     Law(
         "A7.stamp",
-        "No request of a robot has an older stamp than the robot's request before",
+        "No request of a robot has an older stamp than the robot's request before, except after a step"
+        " of the clock",
         "two requests with stamps",
         "RMF's door supervisor ignores a CLOSE older than the OPEN. The door stays open",
         "rmf_ros2 door_supervisor/Node.cpp",

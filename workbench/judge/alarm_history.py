@@ -5,6 +5,7 @@ Some transports hide the sender of a message. No law blames a node for such a me
 """
 
 from bridges.kinds.shared import alarming
+from bridges.kinds.shared.durations import SILENT_S
 from bridges.kinds.shared.fleet_alarm_memory import (
     AlarmHeard,
     Fleets,
@@ -66,7 +67,7 @@ class AlarmHistory(AnyHistory):
         self.stood: tuple[str, ...] = ()
         self.over: dict[str, float] = {}
         self.volatile: bool | None = None
-        self._stating: set[str] = set()
+        self._stated_at: dict[str, float] = {}
         self._fleets: Fleets = frozenset()
 
     def take(self, heard: Heard, own: bool = False) -> bool:
@@ -132,9 +133,11 @@ class AlarmHistory(AnyHistory):
 
     def _end(self, fleets: Fleets) -> None:
         """End the alarms of these fleets, because a `false` lets RMF's robots drive. An alarm stays if
-        its node still states the alarm in its diagnostics."""
+        its node still makes statements. RMF has obeyed the `false`, and a dead node does not
+        contradict it."""
         for node, told in [*self.standing.items()]:
-            if node not in self._stating and overlap(told, fleets):
+            states = self.now - self._stated_at.get(node, NOT_YET) <= SILENT_S
+            if not states and overlap(told, fleets):
                 del self.standing[node]
 
     def _state(self, node: str, state: str, fleets: Fleets) -> None:
@@ -147,7 +150,7 @@ class AlarmHistory(AnyHistory):
             self.rose = self.raised and (self.rose or self.stated_before == "quiet")
             return
         self.others.add(node)
-        self._stating.add(node)
+        keep(self._stated_at, node, self.now)
         if state in alarming.RAISED:
             self.standing[node] = fleets
         else:

@@ -103,6 +103,10 @@ class AnyHistory(ABC):
         """Forget what lasts only until the next check, because the laws have checked the latest
         message."""
 
+    def often(self, times: deque[float]) -> bool:
+        """Return whether `times` is full, and all its times are within OFTEN_S."""
+        return len(times) == times.maxlen and self.now - times[0] < OFTEN_S
+
     def pass_time(self, now: float, wall: float) -> None:
         """Note that time has passed without a message."""
         self.now, self.news = now, None
@@ -187,6 +191,14 @@ class History(AnyHistory, Generic[T]):
         if before is not self._sender and len(self.seen.publishers(moment)) > 1:
             self.turns.append(heard.at)
 
+    @property
+    def publisher(self) -> str:
+        """The node that publishes the device's states; "" if nobody knows. The topic's only publisher
+        publishes this device too."""
+        if self._sender is not None:
+            return self._sender.node
+        return self.senders[0] if len(self.senders) == 1 else ""
+
     @abstractmethod
     def take_other(self, heard: Heard) -> bool:
         """Take a message that is not a state."""
@@ -203,10 +215,6 @@ class History(AnyHistory, Generic[T]):
 
     def forget(self) -> None:
         """Forget requests after a pause, because the node may have restarted."""
-
-    def often(self, times: deque[float]) -> bool:
-        """Return whether `times` is full, and all its times are within OFTEN_S."""
-        return len(times) == times.maxlen and self.now - times[0] < OFTEN_S
 
     def asked(self) -> None:
         """Note a request to this device."""

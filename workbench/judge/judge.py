@@ -115,8 +115,8 @@ class Judge:
         history = self.history
         if not isinstance(history, AlarmHistory | LiftHistory):
             return
-        nodes = history.senders if isinstance(history, LiftHistory) else (history.name,)
-        ours = _plain(nodes) & _plain(names)
+        node = history.publisher if isinstance(history, LiftHistory) else history.name
+        ours = _plain([node]) & _plain(names)
         found = bool(ours - _plain(retaining)) if ours else None
         history.volatile = found if found == self._volatile_before else None
         self._volatile_before = found

@@ -7,11 +7,15 @@ from bridges.messages import words
 from bridges.observe.lift import HAZARDS
 from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, shown
-from workbench.judge.lift_history import ASKED_S, GRACE_S, LATE_S, LiftHistory, moves
+from workbench.judge.lift_history import (
+    ASKED_S,
+    ENDS_WITHIN_S,
+    GRACE_S,
+    LATE_S,
+    LiftHistory,
+    moves,
+)
 
-ENDS_WITHIN_S: Final = 3.0
-"""Maximum time (s) until an END takes effect. It allows one state period of 2 s, and one scan of the
-inputs."""
 GRANTS_WITHIN_S: Final = 30.0
 GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5
@@ -292,12 +296,14 @@ def unserved(history: LiftHistory) -> Finding:
 
 
 def lets_nobody_in(history: LiftHistory) -> Finding:
-    """Check that the lift lets no robot in during a hazard."""
+    """Check that the lift lets no robot in during a hazard. RMF lets a robot in only at the floor that
+    the robot requests, so a robot elsewhere stays out (RequestLift.cpp)."""
     state = history.new
     if state is None or state.current_mode not in HAZARDS or not state.session_id:
         return None
-    if history.offers:
-        return words.described(state)
+    ask = history.asks.get(state.session_id)
+    if history.offers and (ask is None or ask.floor == state.current_floor):
+        return words.described(state) if ask else None
     return None if history.offered else KEPT
 
 
@@ -337,7 +343,7 @@ def no_false(history: LiftHistory) -> Finding:
 def retained(history: LiftHistory) -> Finding:
     """Check that the alarm's publisher is TRANSIENT_LOCAL. Fleet adapters receive nothing from a
     volatile publisher."""
-    if history.volatile is None:
+    if history.volatile is None or history.others:
         return None
     return (
         "its publisher is volatile, so fleet adapters do not receive its messages"

@@ -31,6 +31,9 @@ REOPENS_WITHIN_S: Final = 1.0
 ASKS_S: Final = 6.0
 """Time (s) from a robot's own request, in which a lift may ignore an END from lift_requests. The reason
 is that RMF's restarted supervisor also ends the session of a robot that is still in the car."""
+ENDS_WITHIN_S: Final = 3.0
+"""Maximum time (s) until an END takes effect. It allows one state period of 2 s, and one scan of the
+inputs."""
 REPEATED_S: Final = 1.0
 """Time (s) for which an END with an old stamp must be repeated before it counts."""
 BROKEN_OFF_S: Final = 3.0
@@ -175,9 +178,15 @@ class LiftHistory(History[d.LiftState]):
         return self.before.session_id if self.before else ""
 
     def has_ended(self, session: str, since: float) -> bool:
-        """Return whether an END for this session has come after `since`, or at most LATE_S before
-        it."""
-        return self.ended.get(session, NOT_YET) > since - LATE_S
+        """Return whether an END for this session has come after `since`, or at most LATE_S before it.
+
+        If the session has sent a request since that END, the END belongs to an earlier ride, or the
+        session has survived it. Then the END counts only for a moment.
+        """
+        at, ask = self.ended.get(session, NOT_YET), self.asks.get(session)
+        goes_on = ask is not None and max(ask.own_at, ask.direct_at) > at
+        late = goes_on and self.now - at > ENDS_WITHIN_S + ASKS_S
+        return at > since - LATE_S and not late
 
     def was_asked_to(self, floor: str, within_s: float = float("inf")) -> bool:
         """Return whether the present session requested this floor. Only its last request counts, and
@@ -228,7 +237,9 @@ class LiftHistory(History[d.LiftState]):
         elsewhere = self.before is not None and self.before.current_floor != state.current_floor
         self.travelled |= moves(state) or elsewhere
         opened = self.claims(state)
-        wanted = (state.destination_floor, *self._wanted())
+        wanted = self._wanted()
+        if state.current_mode not in HAZARDS:  # in a hazard the car may go to its recall floor
+            wanted = (state.destination_floor, *wanted)
         self.offers = bool(opened and self.session and not self.offered)
         self._look_at_door(state, opened)
         if self.offers and state.current_floor in wanted:
@@ -340,8 +351,9 @@ class LiftHistory(History[d.LiftState]):
             self.unserved_at = self.now if unserved else self.unserved_at
 
     def _alarm(self, on: bool, sender: Sender | None) -> bool:
-        """Take a message on the fire topic, if this lift's node or an unknown node sent it."""
-        if sender and self._sender and sender.node != self._sender.node:
+        """Take a message on the fire topic, if this lift's node sent it. A message whose sender nobody
+        knows may be of a fire panel."""
+        if sender is None or sender.node != self.publisher or not sender.node:
             return False
         self.called_off = self.alarmed and not on
         if not on and not self.alarmed:

@@ -184,7 +184,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L12.false",
         "`false` is published on fire_alarm_trigger only to end an alarm",
-        "a `false` that ends an alarm",
+        "a `false` that ends an alarm, if the wire names its sender, with only one lift on the graph",
         "One `false` ends another source's alarm, and the robots go on with their tasks",
         "octarobotics/lci-rmf-adapter; rmf_ros2 FleetUpdateHandle::handle_emergency",
         checks.no_false,

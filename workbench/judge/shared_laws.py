@@ -59,7 +59,7 @@ def one_node(history: AnyScene) -> Finding:
     if history.often(history.turns):
         both = history.seen.publishers(Moment(history.now, 0.0))
         return f"two publishers take turns: {', '.join(one.node or '?' for one in both)}"
-    if len(history.senders) > 1 and history.two_rhythms:
+    if len(history.senders) > 1 and history.two_rhythms and not history.others:
         return f"states come at two different rates; publishers: {', '.join(history.senders[:4])}"
     return KEPT if len(history.senders) == 1 and history.has_rhythm else None
 

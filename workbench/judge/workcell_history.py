@@ -16,11 +16,11 @@ class WorkcellHistory(History[d.DispenserState]):
     """The history of one workcell. A guid names a request.
 
     - `listed`: guid -> time of the first state that listed the guid.
-    - `results`: guid -> the last status.
+    - `results`: guid -> the last status. `result_at`: guid -> the time of that result.
     - `acknowledged`: guid -> stamp of its result ACKNOWLEDGED, as long as no state has listed the guid.
     - `left`: the guids that the latest state no longer lists, although the state before listed them.
     - `unexplained`: guid -> the time at which states stopped listing the guid, without a result
-      SUCCESS.
+      SUCCESS or FAILED.
     - `asked_since`: guid -> the times of the requests after its last result.
     - `result`: the latest message, if the message is a result of this workcell.
     - `result_before`: the status of the previous result for the same guid.
@@ -30,6 +30,7 @@ class WorkcellHistory(History[d.DispenserState]):
         super().__init__(name)
         self.listed: dict[str, float] = {}
         self.results: dict[str, int] = {}
+        self.result_at: dict[str, float] = {}
         self.left: tuple[str, ...] = ()
         self.unexplained: dict[str, float] = {}
         self.asked_since: dict[str, list[float]] = {}
@@ -63,6 +64,7 @@ class WorkcellHistory(History[d.DispenserState]):
         self.seen.hear(Moment(heard.at, heard.wall), heard.topic, message)
         self.result, self.result_before = message, self.results.get(guid)
         keep(self.results, guid, message.status)
+        keep(self.result_at, guid, self.now)
         self.acknowledged.pop(guid, None)
         if message.status == d.WorkcellStatus.SUCCESS:
             self.unexplained.pop(guid, None)
@@ -81,7 +83,7 @@ class WorkcellHistory(History[d.DispenserState]):
             self.acknowledged.pop(guid, None)
         for guid in self.left:
             self.listed.pop(guid, None)
-            if self.results.get(guid) != d.WorkcellStatus.SUCCESS:
+            if self.results.get(guid) not in (d.WorkcellStatus.SUCCESS, d.WorkcellStatus.FAILED):
                 keep(self.unexplained, guid, self.now)
 
     def waited_s(self, guid: str) -> float:

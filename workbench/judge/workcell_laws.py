@@ -6,6 +6,7 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import words
+from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
 from workbench.judge.shared_laws import ONE, RATE, STAMP, named, stamped
 from workbench.judge.workcell_history import WorkcellHistory
@@ -13,6 +14,9 @@ from workbench.judge.workcell_history import WorkcellHistory
 ACKNOWLEDGED, SUCCESS, FAILED = d.WorkcellStatus
 SOURCE: Final = "rmf_ros2 phases/DispenseItem.cpp, IngestItem.cpp (_get_status)"
 REPEATS_S: Final = 5.0
+HEARD_S: Final = 3.0
+"""Time (s) without a request after which RMF must have heard a result, because three repeats are
+missing."""
 
 
 def _numbers(history: WorkcellHistory) -> Finding:
@@ -51,9 +55,11 @@ def _leaves_done(history: WorkcellHistory) -> Finding:
 
     The message SUCCESS may get lost. Then RMF continues, and does not repeat the request, so that the
     node does not repeat SUCCESS. Therefore the first request without SUCCESS is no breach, but the
-    second is. After a FAILED, or a restart of the node, the first is a breach too.
+    second is. After a FAILED, or a restart of the node, the first is a breach too. But if RMF has
+    stopped repeating the request after FAILED, its phase has ended, and the queue no longer matters.
     """
-    for guid in history.left:
+    waited_for = [guid for guid in history.left if not _has_failed(history, guid)]
+    for guid in waited_for:
         result = history.results.get(guid)
         if result == SUCCESS:
             continue
@@ -61,7 +67,14 @@ def _leaves_done(history: WorkcellHistory) -> Finding:
             return None
         text = f"request {shown(guid)} left the queue without SUCCESS, so RMF sends the robot on"
         return Doubt(text, partial(_succeeded, history, guid))
-    return KEPT if history.left else None
+    return KEPT if waited_for else None
+
+
+def _has_failed(history: WorkcellHistory, guid: str) -> bool:
+    """Return whether RMF has heard that the request has FAILED. RMF repeats a request each second until
+    it hears a result (DispenseItem.cpp)."""
+    last = max([history.result_at.get(guid, NOT_YET), *history.asked_since.get(guid, ())])
+    return history.results.get(guid) == FAILED and history.now - last > HEARD_S
 
 
 def _succeeded(history: WorkcellHistory, guid: str) -> bool:
@@ -109,8 +122,8 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
         "W2.done",
         "A listed request leaves the queue only if the request has succeeded",
         "a state that no longer lists a request",
-        "RMF counts a request that left the queue as complete, even after FAILED, and sends the"
-        " robot off",
+        "RMF counts a request that left the queue as complete, even if a FAILED comes with that state,"
+        " and sends the robot off",
         SOURCE,
         _leaves_done,
     ),

@@ -73,6 +73,11 @@ def fire() -> Case:
     return scene.heard, "lift", "Lift1"
 
 
+def fire_with_an_open_door_before_the_robot() -> Case:
+    """A node of another maker shows OPEN in fire mode at the floor of a robot that is still outside."""
+    return _recalled_to_the_robot(d.LiftMode.MODE_FIRE)
+
+
 def fire_is_over_and_latched() -> Case:
     """The fire is over, and the lift waits for an operator. A robot has the lift, and another waits for
     it."""
@@ -248,6 +253,20 @@ def door_held_by_a_dead_robot() -> Case:
     return scene.heard, "door", "ward"
 
 
+def door_supervisor_forgets_a_robot() -> Case:
+    """RMF's door supervisor restarts while a robot stands in the doorway, and lets the door close."""
+    scene = Scene("ward", rmf=True)
+    red = scene.robot("fleet/red")
+    red.opens("ward")
+    scene.until(red)
+    scene.run(2.0)
+    scene.supervisors["rmf_door_supervisor"].kill()
+    scene.run(1.0)
+    scene.supervisors["rmf_door_supervisor"].start()
+    scene.run(90.0)
+    return scene.heard, "door", "ward"
+
+
 def door_does_not_open() -> Case:
     """The daemon holds the door open, but the door stays shut."""
     scene = Scene("ward")
@@ -363,6 +382,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         holder_is_dead,
         holder_alone_is_dead,
         fire,
+        fire_with_an_open_door_before_the_robot,
         fire_is_over_and_latched,
         fire_with_a_robot_inside,
         open_but_at_no_floor,
@@ -380,6 +400,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         two_nodes,
         all_is_well,
         door_held_by_a_dead_robot,
+        door_supervisor_forgets_a_robot,
         door_does_not_open,
         door_without_supervisor,
         door_held_open_by_a_person,
@@ -393,6 +414,21 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         charger_is_listed_but_silent,
     )
 }
+
+
+def _recalled_to_the_robot(mode: int) -> Case:
+    scene = Scene()
+    node = _Foreign(scene, current_floor="L3")
+    scene.run(3.0)
+    scene.robot("fleet/red").asks("Lift9", "L1")
+    scene.run(1.0)
+    node.shows(session_id="fleet/red", destination_floor="L1")
+    scene.run(10.0)
+    node.shows(current_mode=mode)
+    scene.run(5.0)
+    node.shows(current_floor="L1", door_state=2)
+    scene.run(10.0)
+    return scene.heard, "lift", "Lift9"
 
 
 def _asked_with_a_cut_contact(contact: str, floor: str, for_s: float) -> Case:
@@ -433,8 +469,7 @@ def _charge(charger: str, robot: str, request: str) -> d.ChargerRequest:
 
 
 class _Foreign:
-    """A lift node of another maker. The node publishes the same state each second, whatever robots
-    ask."""
+    """A lift node of another maker. The node publishes its state each second, whatever robots ask."""
 
     def __init__(self, scene: Scene, stamp_s: float = 0.0, **fields: object) -> None:
         self._scene = scene
@@ -447,6 +482,10 @@ class _Foreign:
         )
         self._state = replace(known, **fields)
         self._say()
+
+    def shows(self, **fields: object) -> None:
+        """Change the state."""
+        self._state = replace(self._state, **fields)
 
     def _say(self) -> None:
         at = stamp(EPOCH + self._scene.timeline.now + self._stamp_s)

@@ -50,3 +50,38 @@ def test_a_charge_that_goes_on_after_a_pause_is_counted_once() -> None:
     known = site.known["charger", NAME]
     assert isinstance(known, ChargerFacts)
     assert known.charges == 2
+
+
+def next_step(*more: Heard, until: float, timeout_s: int = 60) -> str:
+    """Return who has to act after an idle station was asked once to charge a robot, at 10.5 s."""
+    wish = d.ChargerRequest(NAME, "fleet", "red", d.Duration(timeout_s), "r1")
+    idle = [state(float(at), State.CHARGER_IDLE) for at in range(int(until) + 1)]
+    site = HeardDevices(NAME)
+    lines = [*idle, Heard(10.5, 10.5, "charger_requests", wish), *more]
+    for one in sorted(lines, key=lambda one: one.at):
+        site.take(one)
+    return site.explain("charger", NAME, None).next[0].who
+
+
+@pytest.mark.parametrize(
+    ("until", "timeout_s", "who"),
+    [
+        (39.0, 60, "the device's node"),
+        (70.0, 60, "the device's node"),
+        (71.0, 60, "nobody"),
+        (39.0, 20, "nobody"),
+        (12.0, 0, "the device's node"),
+    ],
+)
+def test_a_request_that_an_idle_station_ignores_stands_until_its_start_timeout(
+    until: float, timeout_s: int, who: str
+) -> None:
+    assert next_step(until=until, timeout_s=timeout_s) == who
+
+
+def test_a_request_that_was_cancelled_refused_or_served_stands_no_longer() -> None:
+    cancelled = Heard(12.0, 12.0, "charger_cancels", d.ChargerCancel(NAME, "r1"))
+    refusal = refused("r1", NAME, RobotName("fleet", "red"), "unknown robot").message()
+    served = state(12.5, State.CHARGER_CHARGING, "r1")
+    for one in (cancelled, Heard(12.0, 12.0, "charger_refusals", refusal), served):
+        assert next_step(one, until=39.0) == "nobody"

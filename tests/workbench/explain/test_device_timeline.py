@@ -220,6 +220,20 @@ def test_a_door_is_drawn_with_who_holds_it() -> None:
     assert in_words(lanes(scene.heard, "door", "ward")) == PASSAGE
 
 
+def test_a_restarted_supervisors_close_ends_the_hold_in_the_picture() -> None:
+    scene = Scene("ward", rmf=True)
+    red = scene.robot("fleet/red")
+    red.opens("ward")
+    scene.until(red)
+    scene.run(2.0)
+    scene.supervisors["rmf_door_supervisor"].kill()
+    scene.run(1.0)
+    scene.supervisors["rmf_door_supervisor"].start()
+    scene.run(30.0)
+    (hold,) = lane(lanes(scene.heard, "door", "ward"), "sessions", "fleet/red").spans
+    assert 3.0 < hold.to_s - hold.from_s < 8.0
+
+
 def test_a_charger_is_drawn_with_its_robot() -> None:
     idle = d.ChargerState(stamp(WALL), d.ChargerStateValue.CHARGER_IDLE, "bay1")
     error = replace(idle, state=200, error_message="too hot", request_id="r1")

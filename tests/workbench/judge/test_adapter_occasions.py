@@ -1,18 +1,19 @@
 """The laws for fleet adapters. Each law has an occasion: the event at which a wrong adapter would break
 the law. If the messages contain no such event, the verdict is "not seen"."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import pytest
 from msgspec.structs import replace
 
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from bridges.messages.heard import Heard
+from bridges.messages.heard import Heard, Sender
 from bridges.messages.stamps import stamp
 from tests.workbench.judge.script import door, lift
 from tests.workbench.judge.test_limits import OPEN, RED, Line, car, held, leaf, seconds
 from workbench.judge.judge import LAWS, Judge
+from workbench.judge.law import Verdict
 
 BLUE = "fleet/blue"
 Lines = list[Line]
@@ -29,8 +30,18 @@ def verdict(law: str, lines: Lines, name: str = "fleet") -> tuple[str, str]:
     return found.verdict.value, found.evidence[0].text if found.evidence else ""
 
 
-def asks(at: float, floor: str = "L1", who: str = RED, **fields: int) -> Line:
-    request = replace(lift(who, floor), request_time=stamp(1e3 + at), **fields)
+def broken(lines: Iterable[Heard], name: str = "fleet") -> set[str]:
+    """Return the laws that this adapter breaks."""
+    judge = Judge("adapter", name)
+    told = sorted(lines, key=lambda one: one.at)
+    for one in told:
+        judge.hear(one)
+    last = told[-1].at
+    return {one.law.id for one in judge.end(last, last) if one.verdict is Verdict.BROKEN}
+
+
+def asks(at: float, floor: str = "L1", who: str = RED, clock_s: float = 1e3, **fields: int) -> Line:
+    request = replace(lift(who, floor), request_time=stamp(clock_s + at), **fields)
     return at, topics.ADAPTER_LIFT_REQUESTS, request
 
 
@@ -203,3 +214,102 @@ def test_one_robot_is_judged_by_its_own_requests() -> None:
     wrong = [asks(12.5, "l3", BLUE)]
     assert verdict("A7.floor", [*boards(), *wrong])[0] == "broken"
     assert verdict("A7.floor", [*boards(), *wrong], RED)[0] == "kept"
+
+
+# ---- the adapter, or a dashboard: rmf-web sends END for every robot that it knows
+
+ADAPTER, WEB = Sender("/fleet_adapter"), Sender("/rmf_web")
+
+
+def sent(lines: Lines, by: Sender | None = None) -> list[Heard]:
+    """Return these messages, with their publisher. None: the wire or the recording does not name it."""
+    return [Heard(at, at, topic.name, message, by) for at, topic, message in lines]
+
+
+def end_of(at: float, who: str = RED, clock_s: float = 1e3) -> Line:
+    request = replace(lift(who, "", kind=0), request_time=stamp(clock_s + at))
+    return at, topics.ADAPTER_LIFT_REQUESTS, request
+
+
+DAY: Lines = [*many(0.0, 80.0, car), *alive(80.0)]
+RIDE: Lines = [*arrives(), ends(18.5), *many(19.0, 80.0, car), *alive(80.0)]
+
+
+def test_an_end_for_a_robot_that_is_gone_is_no_id_of_the_adapter() -> None:
+    pressed = [end_of(30.0, "fleet/old"), end_of(30.0), end_of(30.0, "other/old")]
+    assert broken(sent([*DAY, *pressed])) == set()
+    asked = [asks(30.0, "L1", "fleet/old"), *pressed]
+    assert broken(sent([*DAY, *asked])) == {"A7.id"}
+
+
+def test_a_persons_presses_do_not_add_up_to_an_adapter_that_ends_for_ever() -> None:
+    pressed = [end_of(10.0 + 8.0 * n) for n in range(8)]
+    assert broken(sent([*DAY, *pressed])) == set()
+    repeated = [end_of(10.0 + 2.0 * n) for n in range(8)]
+    assert broken(sent([*DAY, *repeated])) == {"A7.stops"}
+
+
+def test_on_a_wire_that_names_publishers_only_the_adapters_own_requests_count() -> None:
+    repeated = many(30.0, 40.0, end_of)
+    ride = sent(RIDE, ADAPTER)
+    assert broken([*ride, *sent(repeated, WEB)]) == set()
+    assert broken([*ride, *sent(repeated, ADAPTER)]) == {"A7.stops"}
+    assert broken([*ride, *sent(repeated, Sender())]) == {"A7.stops"}, "not yet discovered"
+
+
+def test_a_close_that_a_person_sends_for_a_robot_does_not_acquit_its_adapter() -> None:
+    times = (5.0, 17.0, 29.0)
+    passages = [line for at in times for line in passes(at, closes=False)]
+    closes = [opens(at + 8.5, 0) for at in times]
+    assert broken(sent([*passages, *closes], ADAPTER)) == set()
+    assert broken([*sent(passages, ADAPTER), *sent(closes, WEB)]) == {"A8.closes"}
+
+
+def test_a_person_who_asks_in_a_robots_name_is_not_its_adapter() -> None:
+    asked = [opens(70.0), *many(71.0, 79.0, end_of)]
+    assert broken([*sent(RIDE, ADAPTER), *sent(asked, Sender("/rmf_bridge_send"))]) == set()
+
+
+def test_the_clock_of_a_dashboard_is_not_the_adapters() -> None:
+    pressed = [end_of(at, clock_s=5e3) for at in (7.2, 9.2, 25.0)]
+    lines = [*RIDE, *many(19.5, 30.0, asks), *pressed]
+    for one in (sent(lines), [*sent(lines[: -len(pressed)], ADAPTER), *sent(pressed, WEB)]):
+        assert "A7.stamp" not in broken(one)
+
+
+def test_a_clock_that_is_set_back_once_convicts_no_adapter_though_both_kinds_go_back() -> None:
+    def back_s(at: float) -> float:
+        return 3600.0 if at > 50.0 else 0.0
+
+    def at_lift(at: float) -> Line:
+        return asks(at, clock_s=1e4 - back_s(at))
+
+    lines = [
+        *(*DAY, *many(20.0, 25.0, at_lift), *many(60.0, 65.0, at_lift)),
+        *(opens(at, mode, back_s(at)) for at, mode in ((10.0, 2), (11.0, 0), (55.0, 2), (56.0, 0))),
+    ]
+    assert verdict("A7.stamp", lines)[0] == "kept"
+
+
+@pytest.mark.parametrize(("apart_s", "wrong"), [(29.0, True), (31.0, False)])
+def test_stamps_that_go_back_twice_count_only_within_half_a_minute(
+    apart_s: float, wrong: bool
+) -> None:
+    steps = [(0.0, 0.0), (20.0, 30.0), (20.0 + apart_s, 90.0)]
+    lines = [*DAY, *(opens(at, 2, late_s) for at, late_s in steps)]
+    assert (verdict("A7.stamp", lines)[0] == "broken") == wrong
+
+
+@pytest.mark.parametrize("returns_at", [80.1, 60.1])
+def test_an_adapter_that_has_restarted_without_a_robot_cannot_end_its_session(
+    returns_at: float,
+) -> None:
+    """The robot was switched off while it had the lift. From its return on, its adapter is to blame."""
+    lines = [
+        *arrives(140.0),
+        *many(0.1, 20.0, fleet),
+        *many(30.1, returns_at, lambda s: fleet(s, robot="blue")),
+    ]
+    assert broken(sent(lines)) == set()
+    back = many(returns_at, 140.0, fleet)
+    assert broken(sent([*lines, *back])) == ({"A7.ends"} if returns_at < 70.0 else set())

@@ -134,6 +134,20 @@ def test_after_a_third_nodes_false_nobody_else_is_blamed_for_the_end() -> None:
     assert broken([*alarm, says(9.0, False)], "desk") == {"A1.others"}
 
 
+@pytest.mark.parametrize(
+    ("dies_at", "blamed"), [(26, set()), (28, {"A1.others"}), (62, {"A1.others"})]
+)
+def test_a_false_ends_the_alarm_of_a_node_that_has_died_before(
+    dies_at: int, blamed: set[str]
+) -> None:
+    """ "lift" states an alarm and dies. A person resets at the desk, and later at the panel."""
+    lifts = [says(1.0, True, "lift"), *stating("alarm", 1, dies_at, "lift")]
+    panels = [says(1.5, True), *stating("alarm", 2, 60), says(30.2, True), says(60.0, False)]
+    lines = [*lifts, *panels, says(29.5, False, "desk"), *stating("quiet", 61, 70)]
+    assert broken(lines, "panel") == blamed
+    assert broken(lines, "desk") == {"A1.others"}  # the panel's alarm goes on
+
+
 def test_two_nodes_may_end_one_alarm_together() -> None:
     both = [*LIFTS[:6], says(1.5, True), says(5.0, False), says(5.2, False, "lift")]
     both += stating("quiet", 6, 14, "lift")

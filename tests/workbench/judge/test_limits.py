@@ -7,7 +7,7 @@ import pytest
 
 from bridges.messages import definitions as d
 from bridges.messages import topics
-from bridges.messages.heard import Heard
+from bridges.messages.heard import Heard, Sender
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
 from tests.site.timeline import EPOCH
@@ -27,6 +27,7 @@ NAMES: dict[JudgedKind, str] = {
     "dispenser": "store",
     "ingestor": "intake",
 }
+NODE = Sender("/node")
 Line = tuple[float, AnyTopic, d.Message]
 Story = Callable[[float], list[Line]]
 
@@ -37,7 +38,7 @@ def is_broken(kind: JudgedKind, law: str, lines: list[Line]) -> bool:
     judge = Judge(kind, NAMES[kind])
     lines.sort(key=lambda line: line[0])
     for at, topic, message in lines:
-        judge.hear(Heard(at, at, topic.name, message))
+        judge.hear(Heard(at, at, topic.name, message, NODE))
     at = lines[-1][0]
     judge.end(at, at)
     return law in {j.law.id for j in judge.end(at + 2.0, at) if j.verdict is Verdict.BROKEN}
@@ -296,6 +297,26 @@ LIFT: list[tuple[str, Story, float, float]] = [
         lambda x: [car(0.0), asks(0.5), ends(1.0), car(3.0), held(1.0 + x), car(7.0)],
         4.9,
         5.1,
+    ),
+    (  # the robot asks again after an END of its earlier ride, and the lift drops the new session
+        "L4.ends",
+        lambda x: [
+            *(car(0.0), asks(0.5), held(1.0), *seconds(1.5, 6.0, held), ends(6.4), car(7.0)),
+            *seconds(8.0, 30.0, asks),
+            *seconds(8.5, 6.4 + x, held),
+            car(6.4 + x),
+        ],
+        8.9,
+        9.1,
+    ),
+    (  # the session has survived an END of a restarted supervisor, which then forwards requests again
+        "L4.ends",
+        lambda x: [
+            *(car(0.0), *seconds(0.5, 30.0, asks), *seconds(0.6, 30.0, robot_asks)),
+            *(ends(6.2), *seconds(1.0, 6.2 + x, held), car(6.2 + x)),
+        ],
+        8.9,
+        9.1,
     ),
     (  # the supervisor has ended the session, but the robot in the car goes on asking, until it dies
         "L4.ends",

@@ -3,6 +3,7 @@ Without an occasion the verdict is "not seen". With an occasion a correct node k
 wrong node breaks it."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -45,6 +46,7 @@ from tests.workbench.judge.test_limits import (
 from tests.workbench.judge.workcell_stories import WorkcellLines, stories
 from workbench.judge.judge import LAWS, Judge, JudgedKind
 
+LIFTS, PANEL = Sender("/lift_node"), Sender("/fire_panel")
 ERROR, RELEASED = 200, 4
 HUMAN, OFFLINE = 1, 4
 NEVER_READ = -1e3
@@ -87,13 +89,18 @@ def verdict(kind: JudgedKind, law: str, lines: Lines) -> str:
     return found.verdict.value
 
 
+FALSES = ((1.0, False), (2.0, False), (3.0, False))
+
+
 def moving(at: float, door: int = CLOSED) -> Line:
     at, topic, state = car(at, door=door)
     return at, topic, replace(state, motion_state=1)
 
 
-def alarm(at: float, on: bool) -> Line:
-    return at, topics.FIRE_ALARM_TRIGGER, Bool(on)
+def alarms(*lines: tuple[float, bool], by: Sender | None = LIFTS) -> Lines:
+    """Return a state of the lift's node, and alarm messages of the node `by`."""
+    state: Any = (*car(0.0), LIFTS)
+    return [state, *((at, topics.FIRE_ALARM_TRIGGER, Bool(on), by) for at, on in lines)]
 
 
 def twins(line: Callable[[float], Line]) -> Lines:
@@ -210,16 +217,20 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
         rides(asks(2.5, floor="L9")),
         rides(asks(2.5, floor="L9"), held(6.0, to="L9")),
     ),
-    ("lift", "L10.board"): (rides(), rides(mode=FIRE), rides(mode=FIRE, **BOARDS)),
+    ("lift", "L10.board"): (
+        rides(),
+        rides(mode=FIRE),
+        rides(asks(0.6, floor="L1"), mode=FIRE, **BOARDS),
+    ),
     ("lift", "L10.grant"): (
         TO_FIRE,
         [*TO_FIRE, asks(2.5)],
         [*TO_FIRE, asks(7.5), held(8.0, mode=FIRE)],
     ),
     ("lift", "L12.false"): (
-        [car(0.0), alarm(1.0, False), alarm(2.0, True)],
-        [car(0.0), alarm(1.0, True), alarm(2.0, False)],
-        [car(0.0), *(alarm(n, False) for n in (1.0, 2.0, 3.0))],
+        alarms((1.0, False), (2.0, True)),
+        alarms((1.0, True), (2.0, False)),
+        alarms(*FALSES),
     ),
     ("lift", "L12.retained"): (
         cars(),
@@ -318,6 +329,64 @@ def test_a_law_needs_its_occasion(kind: JudgedKind, law: str) -> None:
     assert found == ["not seen", "kept", "broken"]
 
 
+@pytest.mark.parametrize("by", [None, Sender(), PANEL])
+def test_a_false_of_an_unknown_node_or_of_a_panel_is_not_the_lifts(by: Sender | None) -> None:
+    """A fire panel that repeats `false` is real, and `ros2` and rosbag2 name no sender."""
+    assert verdict("lift", "L12.false", alarms(*FALSES, by=by)) == "not seen"
+
+
+@pytest.mark.parametrize(
+    ("shown", "names", "volatile", "found"),
+    [
+        ([], ("/a", "/b"), "/b", "not seen"),
+        ([], ("/a", "/b"), "/a", "not seen"),
+        ([], ("/a", "?"), "/a", "not seen"),
+        ([], ("/a",), "/a", "broken"),
+        ([Sender("/a")], ("/a", "/b"), "/b", "not seen"),
+        ([Sender("/a")], ("/a", "/b"), "/a", "broken"),
+    ],
+)
+def test_a_volatile_alarm_is_the_lifts_only_if_its_own_node_publishes_it(
+    shown: list[Sender], names: tuple[str, ...], volatile: str, found: str
+) -> None:
+    """`shown` names the states' publisher, and `names` all nodes that publish states of lifts."""
+
+    def look(judge: Judge, *, others: bool = False) -> None:
+        judge.hear(Heard(0.0, 0.0, "lift_states", car(0.0)[2], *shown))
+        judge.history.others |= {"Lift2"} if others else set()
+        judge.history.senders = names
+        for _ in range(2):
+            judge.alarm_ends([volatile], [], 0.0, 0.0)
+
+    assert verdict("lift", "L12.retained", [*cars(), look]) == found
+    assert verdict("lift", "L12.retained", [*cars(), partial(look, others=True)]) == "not seen"
+
+
+def test_the_publisher_of_another_lift_makes_no_second_node_of_this_one() -> None:
+    uneven = [car(n + by) for n in range(8) for by in (0.0, 0.3)]
+    assert verdict("lift", "B0.one", [senders("/a", "/b"), *uneven]) == "broken"
+
+    def two_lifts(judge: Judge) -> None:
+        judge.history.others.add("Lift2")
+
+    assert verdict("lift", "B0.one", [senders("/a", "/b"), two_lifts, *uneven]) == "not seen"
+
+
+@pytest.mark.parametrize(
+    ("floor", "to", "found"), [("L3", "L3", "kept"), ("L3", "L1", "kept"), ("L1", "L1", "broken")]
+)
+def test_an_open_door_at_the_recall_floor_lets_in_only_a_robot_that_waits_there(
+    floor: str, to: str, found: str
+) -> None:
+    """The robot waits at `floor`. The lift is recalled to L1, and shows `to` as its destination."""
+    lines = [
+        *(*seconds(0.0, 3.0, car), *seconds(2.5, 20.0, lambda s: asks(s, floor=floor))),
+        *seconds(3.0, 6.0, lambda s: held(s, floor="L3" if floor == "L1" else "L1", to=floor)),
+        *seconds(6.0, 20.0, lambda s: held(s, to=to, mode=FIRE, door=OPEN)),
+    ]
+    assert verdict("lift", "L10.board", [*lines]) == found
+
+
 def test_every_law_has_its_stories() -> None:
     assert list(STORIES) == [(kind, law.id) for kind in words.KINDS for law in LAWS[kind]]
 
@@ -341,6 +410,26 @@ def test_a_listing_state_that_was_lost_or_comes_late_accuses_no_workcell() -> No
     assert verdict("dispenser", "W2.lists", [of.state(0.0), *quick]) == "not seen"
 
 
+@pytest.mark.parametrize(
+    ("asks_until", "delisted_at", "found"),
+    [
+        (4.0, 600.0, "not seen"),
+        (4.0, 8.0, "not seen"),
+        (4.0, 5.0, "broken"),
+        (600.0, 600.0, "broken"),
+    ],
+)
+def test_a_failed_request_may_leave_the_queue_when_rmf_no_longer_asks_for_it(
+    asks_until: float, delisted_at: float, found: str
+) -> None:
+    of = WorkcellLines("dispenser")
+    served = [of.ask(0.1), of.state(0.2, "a", mode=1), of.result(0.3, 0), of.result(3.5, 2)]
+    asked = [of.ask(float(n)) for n in range(1, int(asks_until) + 1)]
+    listed = of.states(delisted_at - 1.0, "a", begin=1.0)
+    lines: Lines = [*served, *asked, *listed, *of.states(delisted_at + 5.0, begin=delisted_at)]
+    assert verdict("dispenser", "W2.done", lines) == found
+
+
 def test_a_request_that_leaves_without_a_result_is_a_breach_the_second_time_or_after_a_restart() -> (
     None
 ):
@@ -357,5 +446,9 @@ def test_a_request_that_leaves_without_a_result_is_a_breach_the_second_time_or_a
     assert verdict("dispenser", "W2.done", [of.state(0.0), *dropped(1.0, "a")]) == "not seen"
     twice: Lines = [of.state(0.0), *dropped(1.0, "a"), *dropped(5.0, "b")]
     assert verdict("dispenser", "W2.done", twice) == "broken"
+    failed = [of.state(1.0, "a"), of.result(1.5, 2), of.state(6.0), *of.states(9.0, begin=7.0)]
+    assert (
+        verdict("dispenser", "W2.done", [of.state(0.0), *failed, *dropped(10.0, "b")]) == "not seen"
+    )
     restarted: Lines = [*of.states(3.0), of.state(3.5, "a"), of.state(12.0), of.state(13.0)]
     assert verdict("dispenser", "W2.done", [*restarted, of.state(14.5)]) == "broken"
