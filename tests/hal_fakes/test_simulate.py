@@ -103,7 +103,7 @@ def test_closing_leaves_no_thread_and_no_socket(simulation: Simulation, tmp_path
 
 def test_each_of_several_buses_has_its_own_socket(tmp_path: Path) -> None:
     text = SHIPPED.read_text().replace(
-        "  header: {type: gpio}", "  header: {type: gpio}\n  other: {type: gpio}"
+        "  header: {type: gpio}", "  header: {type: gpio}\n  other: {type: gpio, chip: 1}"
     )
     second = text[text.index("  Lift1:") :].replace("Lift1:", "Lift2:\n    bus: other")
     text = text.replace("Lift1:", "Lift1:\n    bus: header") + second
