@@ -23,7 +23,7 @@ from bridges.blackbox.ring import Ring
 from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
-from bridges.runtime import guard, holder, last_mark, order, record, signals
+from bridges.runtime import guard, last_mark, order, record, signals
 from bridges.runtime.diagnostics import CERTIFICATE_FILES, diagnosis
 from bridges.runtime.guard import Guard
 from bridges.runtime.notify import notify, watchdog_s
@@ -80,8 +80,6 @@ class Daemon:
         self._end = end
         self._simulated = simulated
         self._once = Once()
-        ourselves = holder.ourselves(config.path, serves=True)
-        self._process = {"boot": ourselves.boot, "started": ourselves.started}
         self._guard: Guard | None = None
         self._predecessor: Predecessor | None = None
         ours, unsafe = record.of(config), frozenset[str]()
@@ -282,8 +280,10 @@ class Daemon:
         }
         devices = self._service.devices()
         answer = self._answer()
-        answered = {"order": answer, "devices": devices, **self._process}
-        self._runtime.write_status(msgspec.json.encode({**daemon, **answered}))
+        ours = self._runtime.process
+        process = {"boot": ours.boot, "started": ours.started}
+        told = {**daemon, "order": answer, "devices": devices, **process}
+        self._runtime.write_status(msgspec.json.encode(told))
         if answer:
             self._next_order_at = min(self._next_order_at, time.monotonic() + SHOWN_S)
         if self._diagnostics is None:

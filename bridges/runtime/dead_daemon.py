@@ -8,7 +8,7 @@ for a directory that is full, missing or read-only.
 import argparse
 import logging
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -46,8 +46,9 @@ def switch_off(args: argparse.Namespace) -> int:
     answered = ages(places)
     records = Records(places)
     if args.record:  # the daemon that started this process has the lock (`predecessor.py`)
-        return _off_by_records(records, args.record, answered)
-    own = [r.name for r in records.unreleased() if r.file == named(file)]
+        found = [r for r in records.unreleased() if r.name in args.record]
+        return _off_by_records(records, found, answered)
+    own = [r for r in records.unreleased() if r.file == named(file)]
     claimed = last_mark.says_claimed(os.environ) and bool(own)
     try:
         held = runtime.RuntimeDirectory(
@@ -88,10 +89,10 @@ def _places(file: Path, given: str | None) -> Directories | None:
 def _off_by_all(records: Records, file: Path, answered: Mapping[str, float]) -> int:
     """Switch off the outputs of all records. If none of them is of this file, switch off the outputs of
     its YAML too."""
-    found = {record.name: record.file for record in records.unreleased()}
-    others = {name: other for name, other in found.items() if other != named(file)}
-    for name, other in others.items():
-        logging.warning(pairs("record_of_another_file", record=name, file=other))
+    found = records.unreleased()
+    others = [record for record in found if record.file != named(file)]
+    for other in others:
+        logging.warning(pairs("record_of_another_file", record=other.name, file=other.file))
     if len(others) < len(found):
         return _off_by_records(records, found, answered)
     within_s = TIMEOUT_S / (len(found) + 1)
@@ -117,13 +118,12 @@ def _off_by_yaml(file: Path, answered: Mapping[str, float], within_s: float = TI
 
 def _off_by_records(
     records: Records,
-    names: Collection[str],
+    found: Sequence[ClaimRecord],
     answered: Mapping[str, float],
     each_s: float | None = None,
 ) -> int:
-    """Switch off the outputs of the records in `names`. Each record has `each_s` (s), or an equal part
-    of TIMEOUT_S."""
-    found = [r for r in records.unreleased() if r.name in names]
+    """Switch off the outputs of these records. Each record has `each_s` (s), or an equal part of
+    TIMEOUT_S."""
     each_s = each_s or TIMEOUT_S / max(1, len(found))  # so one dead bus leaves time for others
     return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
 

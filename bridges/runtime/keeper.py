@@ -9,7 +9,7 @@ import logging
 from collections.abc import Mapping
 from typing import Final, Generic, Protocol
 
-from bridges.kinds.shared.decision import Fault, M, R
+from bridges.kinds.shared.decision import NOT_KEPT, Fault, M, R
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.kinds.shared.kind import E, L, S
@@ -20,7 +20,6 @@ from bridges.system.log import pairs
 log = logging.getLogger(__name__)
 
 AGAIN_S: Final = 1.0
-NOT_KEPT: Final = "NOT_KEPT"
 
 
 class MemoryStore(Protocol):

@@ -168,7 +168,8 @@ class Once:
 class RuntimeDirectory:
     """The lock, the status and the record of one process.
 
-    `serves`: Is the process a daemon, which obeys a person's orders?
+    `serves`: Is the process a daemon, which obeys a person's orders? `process`: this process, as
+    `holder.json` names it.
     """
 
     def __init__(
@@ -181,14 +182,14 @@ class RuntimeDirectory:
         self.places = places
         self.path = places.runtime
         self.records = Records(places)
-        self._holder = holder.ourselves(file, serves=serves)
+        self.process = holder.ourselves(file, serves=serves)
         self._locks: dict[Path, int] = {}
         self._record: ClaimRecord | None = None
         self._once = Once()
         deadline = time.monotonic() + wait_s
         for folder in places.folders:
             self._lock_by(folder, deadline)
-        self._sign(self._holder)
+        self._sign(self.process)
 
     def claim(self, record: ClaimRecord) -> None:
         """Write the record, before this daemon claims outputs. If writing fails, `write_status` tries
@@ -210,7 +211,7 @@ class RuntimeDirectory:
         missing."""
         for folder in self.places.folders:
             self._lock(folder)
-        self._sign(self._holder)
+        self._sign(self.process)
         self._write_record()
         try:
             files.show(self.path / STATUS, json)
@@ -223,7 +224,7 @@ class RuntimeDirectory:
         """Release the locks for another daemon, and remove the outdated status."""
         with suppress(OSError), opened(self.path):
             (self.path / STATUS).unlink(missing_ok=True)
-        self._sign(msgspec.structs.replace(self._holder, pid=0))
+        self._sign(msgspec.structs.replace(self.process, pid=0))
         self._unlock()
 
     def _unlock(self) -> None:

@@ -28,6 +28,8 @@ HARMLESS: Final = {signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINC
 """The signals that by default neither end nor suspend a process."""
 WRITES: Final = {signal.SIGPIPE, signal.SIGXFSZ}
 RESET: Final = signal.SIGUSR1
+PIPE_BYTES: Final = 1 << 16
+"""The size of a pipe in Linux."""
 TERMINAL: Final = {signal.SIGTTIN, signal.SIGTTOU}
 
 ENDING: Final = frozenset(signal.valid_signals()) - {
@@ -68,27 +70,26 @@ class End:
 class Orders:
     """The signal RESET, which announces a person's order (`bridges/runtime/order.py`).
 
-    The handler only notes the signal, because a second signal may interrupt the handler, and any lock
-    may be held. `read` is a pipe's end that becomes readable after a signal.
+    The handler only writes to a pipe, because a second signal may interrupt the handler, and any lock
+    may be held. `read` is the pipe's end that becomes readable after a signal.
     """
 
     def __init__(self) -> None:
         """Begin to catch the signal."""
         self.read, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        self._announced = False
         signal.signal(RESET, self._on_signal)
 
     def announced(self) -> bool:
         """Return whether a signal has come since the last call."""
-        if not self._announced:
+        try:
+            # before the caller looks for orders, so that none is missed
+            os.read(self.read, PIPE_BYTES)
+        except BlockingIOError:
             return False
-        os.read(self.read, 1)
-        self._announced = False  # before the caller looks for orders, so that none is missed
         return True
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        if not self._announced:
-            self._announced = True
+        with suppress(BlockingIOError):  # so many signals have come already
             os.write(self._write, b".")
 
 

@@ -313,7 +313,8 @@ class VdaRobot:
         """
         if self._waits or not self._is_last(self._order_id):
             return "", ""
-        ours = {self._order_id, *(f"{what}-{self._order_id}" for what in ("act", "dock", "leave"))}
+        acts = (action_id(what, self._order_id) for what in ("act", "dock", "leave"))
+        ours = {self._order_id, *acts}
         found = [told(error) for error in errors(state) if ours & set(references(error))]
         if text(state, "orderId") != self._order_id:
             return "; ".join(found), ""
@@ -346,25 +347,25 @@ class VdaRobot:
 
     def _order(self, command: RobotCommand) -> None:
         assert self._at is not None
-        last: list[Json] = []
+        number, last = order_id(command), list[Json]()
         if command.doing == "dock" and self._settings.dock_action:
-            last.append(action(self._settings.dock_action, action_id("dock", command), {}, "HARD"))
+            last.append(action(self._settings.dock_action, action_id("dock", number), {}, "HARD"))
         if command.doing == "act":
             known = self._settings.actions.get(command.activity)
             if known is None:
                 raise DriverError(f"the YAML has no action '{command.activity}' for this robot")
             given = msgspec.json.decode(command.description)
             parameters = given if isinstance(given, dict) else {"description": given}
-            last.append(action(known.type, action_id("act", command), parameters, "HARD"))
+            last.append(action(known.type, action_id("act", number), parameters, "HARD"))
         charging = part(self._state, self._says.power).get("charging")
         first = []
         if charging and command.goal is not None:
-            first.append(action("stopCharging", action_id("leave", command), {}, "HARD"))
+            first.append(action("stopCharging", action_id("leave", number), {}, "HARD"))
         node = text(self._state, "lastNodeId")
         within_m = self._settings.limits.arrived_m
         made = order(self._settings.version, command, self._at, node, within_m, (first, last))
         self._publish("order", made)
-        self._order_id = order_id(command)
+        self._order_id = number
 
     def _instant(self, kind: str, action_id: str, parameters: Mapping[str, object]) -> None:
         blocking = "NONE" if self._settings.version == "3.0" else "HARD"

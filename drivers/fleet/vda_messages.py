@@ -79,9 +79,10 @@ def order_id(command: RobotCommand) -> str:
     return str(command.id) if command.attempt == 1 else f"{command.id}-{command.attempt}"
 
 
-def action_id(what: str, command: RobotCommand) -> str:
-    """Return the id of an order's action. Each attempt has its own id, as VDA 5050 demands."""
-    return f"{what}-{order_id(command)}"
+def action_id(what: str, order: str) -> str:
+    """Return the id of an action of the order with this id. Each attempt has its own id, as VDA 5050
+    demands."""
+    return f"{what}-{order}"
 
 
 def order(

@@ -56,14 +56,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error("less than 0.3 hours is no day")
     if options.kill_every and options.rmf not in SUPERVISORS[1:]:
         parser.error("--kill-every needs --rmf kilted or jazzy")
-    size = hospital(*options.size) if options.size else SITE
-    began, site = time.perf_counter(), Site(seed, options.rmf, options.kill_every, size)
+    began = time.perf_counter()
     if options.saved and options.saved.exists():
         try:
             site = load(options.saved)
         except OtherCode as other:
             parser.error(str(other))
         site.looks.clear()  # of another process
+    else:
+        size = hospital(*options.size) if options.size else SITE
+        site = Site(seed, options.rmf, options.kill_every, size)
     _print(f"seed {site.seed}, {options.hours:g} hours, supervisors: {site.rmf}")
     try:
         while (left_h := options.hours - site.timeline.now / HOUR_S) > 0.0:

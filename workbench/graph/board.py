@@ -21,6 +21,7 @@ from bridges.observe.all_devices import AnyDevice, ObservedGraph, PlainGraph
 from bridges.observe.diagnosis import COORDINATOR, PANEL, PASSIVE, Diagnosis
 from bridges.observe.door import ObservedDoor
 from bridges.observe.limits import SILENT_S
+from bridges.observe.requesters import Moment
 from bridges.observe.robots import ObservedRobot, robots, waits
 from bridges.system.columns import aligned, clipped, hanging, width
 from bridges.system.paint import repainted
@@ -148,7 +149,7 @@ class Board:
             daemon = nodes.get(f"{one.node}: daemon")
             simulated = daemon is not None and self._graph.simulated(daemon)
             text, faults = one.condition, _faults([daemon] if daemon else [])
-            mark = _silent(daemon, now) if daemon else ""
+            mark = _silent(daemon.last, now) if daemon else ""
             yield BoardRow("alarm", one.node, text, mark=mark, simulated=simulated, faults=faults)
         for name, panel in nodes.items():
             if panel.kind == PANEL and not name.endswith(": daemon"):
@@ -158,7 +159,7 @@ class Board:
                     "alarm",
                     shown,
                     words.printable(state),
-                    mark=_silent(panel, now),
+                    mark=_silent(panel.last, now),
                     simulated=self._graph.simulated(panel),
                     faults=_faults([panel]),
                 )
@@ -175,7 +176,7 @@ class Board:
                 words.printable(name.partition(": ")[0]),
                 words.printable(f"passive: {passive}") if passive else _coordinates(diagnosis),
                 waiting=words.printable(queue),
-                mark=_silent(diagnosis, now),
+                mark=_silent(diagnosis.last, now),
                 simulated=self._graph.simulated(diagnosis),
                 faults=_faults([diagnosis]),
             )
@@ -201,15 +202,16 @@ class Board:
             held_by=self._places.get(one.who, "-"),
             waiting=words.printable(", ".join(f"{d.kind} {d.id}: {w.wants}" for d, w in asks)),
             age=_seconds(said.value("input_age_s"), silent_s),
-            mark=_silent(said, now),
+            mark=_silent(said.last, now),
             simulated=self._graph.simulated(said),
             faults=_faults([said]),
         )
 
 
-def _silent(said: Diagnosis, now: float) -> str:
-    """Return the mark of a row whose report no longer comes."""
-    return "" if said.is_current(now) else f"SILENT {now - said.last.at:.0f} s"
+def _silent(last: Moment, now: float) -> str:
+    """Return the mark of a row whose last state or report came at `last`; "" while they come."""
+    silent_s = now - last.at
+    return f"SILENT {silent_s:.0f} s" if silent_s > SILENT_S else ""
 
 
 def _waiting(said: Diagnosis) -> str:
@@ -255,9 +257,8 @@ def _seconds(age_s: str, more_s: float) -> str:
 
 
 def _mark(device: AnyDevice, now: float) -> str:
-    silent_s = now - device.last_state.at if device.last_state else 0.0
-    if silent_s > SILENT_S:
-        return f"SILENT {silent_s:.0f} s"
+    if device.last_state and (silent := _silent(device.last_state, now)):
+        return silent
     if device.reading.value == "is from the future":
         return "CLOCK AHEAD"
     return "STALE" if device.reading.value else ""

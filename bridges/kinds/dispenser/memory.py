@@ -9,7 +9,7 @@ import msgspec
 from bridges.kinds.dispenser.settings import WorkcellDurations, WorkcellSettings
 from bridges.kinds.dispenser.signals import Item, WorkcellSample
 from bridges.kinds.shared.debounce import Settled, forget, settle
-from bridges.kinds.shared.decision import Fault
+from bridges.kinds.shared.decision import NOT_KEPT, Fault
 from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 SIGNALS: Final = ("done", "busy", "ready", "fault")
@@ -187,7 +187,7 @@ def obstacles(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Ite
     if doubtful := memory.doubtful():
         yield Fault("OUTCOME_UNKNOWN", _doubts(doubtful))
     if memory.not_kept:
-        yield Fault("NOT_KEPT", f"nothing is accepted or started: {memory.not_kept}")
+        yield Fault(NOT_KEPT, f"nothing is accepted or started: {memory.not_kept}")
     if rivalled(memory, now):
         yield Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes states of this workcell")
     if not is_fresh(memory.senses, now, limits):

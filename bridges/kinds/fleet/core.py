@@ -83,7 +83,7 @@ def decide(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) -
     raises."""
     memory = _hear(memory, event, now, limits)
     if limits.light:
-        memory = light.follow(memory, now, limits)
+        memory = light.follow(memory, limits)
     memory = _advance(memory, now, limits)
     if limits.light:
         memory = light.steer(memory, now, limits)
@@ -163,7 +163,7 @@ def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemor
     if command is None:
         return memory
     if command.doing in ("stop", "pause"):
-        if _has_stopped(memory, command, now):
+        if _has_stopped(memory, command):
             return replace(memory, command=None)
         return _again(memory, now) if now >= memory.asked_at + limits.t.stops_s else memory
     if not memory.fresh:
@@ -173,10 +173,10 @@ def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemor
     memory = _arrival(memory, command, now, limits)
     if command.doing != "resume" and _is_done(memory, command, now, limits):
         return replace(memory, command=None, finished=command.id, arrived_at=None)
-    return _again(memory, now) if now >= _again_at(memory, command, now, limits) else memory
+    return _again(memory, now) if now >= _again_at(memory, command, limits) else memory
 
 
-def _has_stopped(memory: RobotMemory, command: RobotCommand, now: float) -> bool:
+def _has_stopped(memory: RobotMemory, command: RobotCommand) -> bool:
     """Return whether the robot was seen to stand after it had taken the stop or pause. A robot that
     stands without it may just have taken the command that must be stopped."""
     if not stands(memory):
@@ -196,7 +196,7 @@ def _again(memory: RobotMemory, now: float) -> RobotMemory:
 def _arrival(
     memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits
 ) -> RobotMemory:
-    here = command.doing == "dock" and _is_there(memory, command, now, limits)
+    here = command.doing == "dock" and _is_there(memory, command, limits)
     if not here:
         return replace(memory, arrived_at=None)
     return replace(memory, arrived_at=now) if memory.arrived_at is None else memory
@@ -210,14 +210,14 @@ def _is_done(memory: RobotMemory, command: RobotCommand, now: float, limits: Rob
         case "localize":
             assert command.goal is not None
             return off_goal_m(memory, command.goal, limits) <= RELOCALISED_M
-    if not _is_there(memory, command, now, limits):
+    if not _is_there(memory, command, limits):
         return False
     assert command.goal is not None
     at_charger = command.doing == "dock" and _charger(command.goal, limits)
     return not at_charger or charges(memory, command.goal.name, now) is not False
 
 
-def _is_there(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> bool:
+def _is_there(memory: RobotMemory, command: RobotCommand, limits: RobotLimits) -> bool:
     assert command.goal is not None
     assert memory.reading is not None
     if off_goal_m(memory, command.goal, limits) > limits.t.arrived_m:
@@ -227,7 +227,7 @@ def _is_there(memory: RobotMemory, command: RobotCommand, now: float, limits: Ro
     return stands(memory) and faces(memory, command.goal, limits)
 
 
-def _again_at(memory: RobotMemory, command: RobotCommand, now: float, limits: RobotLimits) -> float:
+def _again_at(memory: RobotMemory, command: RobotCommand, limits: RobotLimits) -> float:
     """Return the time of the next attempt. Return NEVER while the robot moves by the command, and while
     a person or the robot itself keeps it standing."""
     assert memory.reading is not None

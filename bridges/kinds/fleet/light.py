@@ -69,7 +69,7 @@ def hear(memory: RobotMemory, answer: LightAnswer) -> RobotMemory:
     return replace(memory, light=replace(light, answer=answer, granted=granted))
 
 
-def follow(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
+def follow(memory: RobotMemory, limits: RobotLimits) -> RobotMemory:
     """Update the path, and the last reached checkpoint, from the last reading."""
     reading = memory.reading
     if reading is None or not memory.fresh or on_other_map(memory, limits):
@@ -208,7 +208,7 @@ def resumed(memory: RobotMemory, now: float, limits: RobotLimits) -> bool:
     return not waits or (not memory.light.path and now >= memory.asked_at + limits.t.stops_s)
 
 
-def question(memory: RobotMemory, now: float, limits: RobotLimits) -> LightQuestion | None:
+def question(memory: RobotMemory, limits: RobotLimits) -> LightQuestion | None:
     """Return the robot's progress for RMF's traffic light. Return None if the last reading gave no
     place on RMF's map."""
     light = memory.light

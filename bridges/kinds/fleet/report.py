@@ -61,7 +61,7 @@ def report(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotReport:
         doing=_light(memory, limits) if limits.light else _doing(memory),
         read_at=memory.read_at,
         faults=found,
-        light=question(memory, now, limits) if limits.light else None,
+        light=question(memory, limits) if limits.light else None,
     )
 
 
@@ -133,12 +133,12 @@ def faults(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fau
         yield Fault("ROBOT_TAKEN_OUT", memory.reading.taken_out)
     yield from _of_place(memory, limits)
     yield from _of_charge(memory, now, limits)
-    yield from _of_command(memory, now, limits)
+    yield from _of_command(memory, limits)
     if limits.light:
-        yield from _of_light(memory, now)
+        yield from _of_light(memory)
 
 
-def _of_light(memory: RobotMemory, now: float) -> Iterator[Fault]:
+def _of_light(memory: RobotMemory) -> Iterator[Fault]:
     light, reading = memory.light, memory.reading
     assert reading is not None
     if reading.paused and not light.held:
@@ -174,7 +174,7 @@ def _of_charge(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator
             yield Fault("CHARGER_REPORTS_ERROR", f"{charger}: {pad.state.error}")
 
 
-def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fault]:
+def _of_command(memory: RobotMemory, limits: RobotLimits) -> Iterator[Fault]:
     command, reading = memory.command, memory.reading
     assert reading is not None
     if command is None:

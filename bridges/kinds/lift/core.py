@@ -51,7 +51,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift import drive, forgotten, sensing, sessions
 from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
-from bridges.kinds.lift.report import NOT_FRESH, NOT_KEPT, LiftReport, report
+from bridges.kinds.lift.report import NOT_FRESH, LiftReport, report
 from bridges.kinds.lift.sensing import HAZARDS, BelievedLift, gap, look, take, trust, unsure
 from bridges.kinds.lift.signals import (
     Event,
@@ -62,6 +62,7 @@ from bridges.kinds.lift.signals import (
     LiftSample,
 )
 from bridges.kinds.shared.decision import (
+    NOT_KEPT,
     STARTING,
     Decision,
     Fault,

@@ -8,11 +8,10 @@ from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
 from bridges.kinds.lift.relays import Relays
 from bridges.kinds.lift.sensing import BelievedLift
 from bridges.kinds.lift.signals import Hazard, LiftOutputs, Motion
-from bridges.kinds.shared.decision import AlarmInputs, Fault
+from bridges.kinds.shared.decision import NOT_KEPT, AlarmInputs, Fault
 from bridges.messages.definitions import LiftDoor, LiftMode, LiftMotion
 
 NOT_FRESH = "INPUTS_NOT_FRESH"
-NOT_KEPT = "NOT_KEPT"
 OFFLINE = frozenset({"OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
 """Faults that show the lift as OFFLINE. Without fresh inputs the lift is OFFLINE too."""
 

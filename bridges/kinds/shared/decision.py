@@ -5,7 +5,7 @@ clock and no log. `now` is monotonic seconds. Each call derives the whole set of
 report afresh. Therefore a repeated, lost or reordered event cannot leave a relay in a wrong position.
 """
 
-from typing import Generic, Literal, Protocol, TypeVar
+from typing import Final, Generic, Literal, Protocol, TypeVar
 
 import msgspec
 
@@ -93,6 +93,10 @@ class MemoryNotKept(msgspec.Struct, frozen=True):
     """The memory could not be written to disk. The next attempt follows in a second."""
 
     reason: str
+
+
+NOT_KEPT: Final = "NOT_KEPT"
+"""The code of the fault that a memory is not on disk."""
 
 
 class DecidedByPerson(msgspec.Struct, frozen=True):
