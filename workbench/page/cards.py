@@ -58,7 +58,12 @@ class Wall(Protocol):
 
 
 class Cards:
-    """All cards, and the browsers that show the cards."""
+    """All cards, and the browsers that show the cards.
+
+    `parts` is the content of everything except the cards, by element id, as the browsers got it last. A
+    browser that connects gets the same content, because later changes are found by comparison with
+    it.
+    """
 
     def __init__(
         self, site: LiveSite, listener: Listener, clock: Callable[[], float] = time.monotonic
@@ -71,12 +76,15 @@ class Cards:
         self._listener = listener
         self._clock = clock
         self._aged_at = float("-inf")
+        self._failed = False
         self._car_places: dict[Key, float | None] = {}
-        self._parts: dict[str, str] = {}
         self._remedies = faults.for_explain()
+        self.parts = self._drawn_parts()
 
     def turn(self) -> None:
-        """Take the messages that have arrived, and draw the changes."""
+        """Take the messages that have arrived, and draw the changes. After a turn that has failed, draw
+        everything, because the browsers may have missed a change."""
+        again, self._failed = self._failed, True
         heard = self._listener.turn()
         now = self._clock()
         changed: dict[str, str] = {}
@@ -93,39 +101,37 @@ class Cards:
             told = script(changed)
             for wall in self.walls:
                 wall.change(told)
+        if again:
+            self._rebuild()
+        self._failed = False
         for wall in self.walls:
             wall.answer(self.wrong)
 
     def _changed_parts(self) -> dict[str, str]:
         self.wrong = sum(one.row.wrong for one in self.shown.values())
-        before, self._parts = self._parts, self.parts()
-        return {place: html for place, html in self._parts.items() if before.get(place) != html}
+        before, self.parts = self.parts, self._drawn_parts()
+        return {place: html for place, html in self.parts.items() if before[place] != html}
 
-    def parts(self) -> dict[str, str]:
-        """Draw everything except the cards. Return element id -> content."""
+    def _drawn_parts(self) -> dict[str, str]:
         return {
-            STATUS: self.status(),
-            STANDING: self.standing(),
-            WRONG: self.attention(),
-            ROBOTS: self.robots(),
+            STATUS: self._status(),
+            STANDING: drawing.standing(self._site.alarms()),
+            WRONG: self._attention(),
+            ROBOTS: self._robots(),
         }
 
-    def standing(self) -> str:
-        """Say why robots stand, if an alarm or a drill stops them."""
-        return drawing.standing(self._site.alarms())
-
-    def attention(self) -> str:
+    def _attention(self) -> str:
         """List the devices that need attention, each with its trouble and the remedy."""
         wrong = [self.shown[key] for key in sorted(self.shown) if self.shown[key].row.wrong]
         return drawing.attention(wrong, self._remedies)
 
-    def status(self) -> str:
+    def _status(self) -> str:
         """Return one line with the number of devices heard, and the number of devices that need
         attention."""
         told = " · ".join(self._told())
         return f'<p class="status" role="status">{told}</p>'
 
-    def robots(self) -> str:
+    def _robots(self) -> str:
         """Draw the robots that fleets report, except robots that have a card."""
         own = {
             name

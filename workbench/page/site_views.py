@@ -64,11 +64,11 @@ class SiteWall(Tab):
         self._cards = cards
         self._missed = False
         self._built = 0
-        part(f'<div id="{STATUS}">{cards.status()}</div>{LOST}{FILTERS}')
-        part(f'<div id="{STANDING}">{cards.standing()}</div>')
-        part(f'<div id="{WRONG}">{cards.attention()}</div>')
+        part(f'<div id="{STATUS}">{cards.parts[STATUS]}</div>{LOST}{FILTERS}')
+        part(f'<div id="{STANDING}">{cards.parts[STANDING]}</div>')
+        part(f'<div id="{WRONG}">{cards.parts[WRONG]}</div>')
         self._box = part()
-        part(f'<div id="{ROBOTS}">{cards.robots()}</div>')
+        part(f'<div id="{ROBOTS}">{cards.parts[ROBOTS]}</div>')
         self.rebuild()
 
     def change(self, script: str) -> None:
@@ -95,7 +95,7 @@ class SiteWall(Tab):
         self._box.set_content(
             f'<div class="sections" data-built="{self._built}">{html or none}</div>'
         )
-        self.run(f"show({json.dumps(self._cards.parts())})")
+        self.run(f"show({json.dumps(self._cards.parts)})")
 
     def _section(self, kind: str, title: str) -> str:
         keys = sorted(key for key in self._cards.cards if key[0] == kind)

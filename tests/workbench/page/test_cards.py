@@ -3,6 +3,7 @@ changes in one script. Without a change the page sends no script."""
 
 import json
 
+import pytest
 from msgspec.structs import replace
 
 from bridges.messages import topics
@@ -11,10 +12,11 @@ from bridges.messages.stamps import stamp
 from bridges.runtime.diagnostics import diagnosis
 from bridges.transports.transport import Transport, TransportError
 from tests.workbench.page.test_live_site import LIFT, WALL, heard, lift
-from workbench.page.cards import Cards, place_of, script
+from workbench.page import drawing
+from workbench.page.cards import STATUS, WRONG, Cards, place_of, script
 from workbench.page.drawing import SILENT_DO
 from workbench.page.listener import Listener
-from workbench.page.live_site import LiveSite
+from workbench.page.live_site import DeviceView, LiveSite
 
 HOSTILE = "</script>\u2028\"'`${1}"
 
@@ -64,11 +66,37 @@ def test_all_changes_of_a_turn_are_one_script_for_every_browser() -> None:
         walls[0].changes
         == walls[1].changes
         == [
-            ["card/lift/Lift1", "card/lift/Lift2", "status", "standing", "wrong", "robots"],
+            ["card/lift/Lift1", "card/lift/Lift2", "status"],
             ["card/lift/Lift1", "card/lift/Lift2"],
         ]
     )
     assert [wall.wrong for wall in walls] == [0, 0]
+
+
+def test_after_a_card_could_not_be_drawn_every_browser_gets_everything(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    site, wall, drawn = LiveSite(), Wall(), drawing.card
+    listener = Listener(site, nowhere)
+    cards = Cards(site, listener, lambda: 99.0)
+    cards.walls.append(wall)
+
+    def draw(shown: DeviceView, before: float | None) -> str:
+        assert shown.row.name != "Lift2", "Lift2 cannot be drawn"
+        return drawn(shown, before)
+
+    listener.hear(lift(99.0))
+    monkeypatch.setattr(drawing, "card", draw)
+    cards.turn()
+    listener.hear(lift(99.0, "Lift2"))
+    listener.hear(replace(lift(99.0), message=replace(LIFT, current_floor="L2")))
+    with pytest.raises(AssertionError, match="Lift2"):
+        cards.turn()  # Lift1 is drawn, and not sent
+    monkeypatch.undo()
+    rebuilt = wall.rebuilt
+    cards.turn()
+    cards.turn()
+    assert wall.rebuilt == rebuilt + 1
 
 
 def test_a_panel_and_a_coordinator_that_fell_silent_stay_and_need_attention() -> None:
@@ -81,13 +109,13 @@ def test_a_panel_and_a_coordinator_that_fell_silent_stay_and_need_attention() ->
         listener.hear(heard(1.0, topics.DIAGNOSTICS, told))
     keys = [("alarm", "Main panel"), ("coordinator", "charger_coordinator_a")]
     cards.turn()
-    assert (sorted(cards.cards), cards.wrong, cards.attention()) == (keys, 0, "")
+    assert (sorted(cards.cards), cards.wrong, cards.parts[WRONG]) == (keys, 0, "")
     now[0] = 9.0
     cards.turn()
     assert (sorted(cards.cards), cards.wrong) == (keys, 2)
     assert ["◷ OLD: silent" in cards.cards[key] for key in keys] == [True, True]
-    assert "2 need attention" in cards.status()
-    assert cards.attention().count("✖ OLD: silent") == cards.attention().count(SILENT_DO) == 2
+    assert "2 need attention" in cards.parts[STATUS]
+    assert cards.parts[WRONG].count("✖ OLD: silent") == cards.parts[WRONG].count(SILENT_DO) == 2
 
 
 def test_a_script_has_every_text_as_data_in_plain_ascii() -> None:
