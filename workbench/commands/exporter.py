@@ -105,6 +105,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     finally:
         server.shutdown()
+        server.server_close()
         thread.join()
     return 0
 

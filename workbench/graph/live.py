@@ -71,7 +71,7 @@ class Ear:
         *,
         others_only: bool = False,
     ) -> None:
-        self._sender = transport.sender
+        self._transport = transport
         self._waiting: SimpleQueue[Heard] = SimpleQueue()
         self.ends = subscribed(
             transport,
@@ -82,15 +82,21 @@ class Ear:
 
     def _received(self, topic: str, message: Message) -> None:
         at, wall = time.monotonic(), time.time()
-        self._waiting.put(Heard(at, wall, topic, bounded(message), self._sender()))
+        self._waiting.put(Heard(at, wall, topic, bounded(message), self._transport.sender()))
 
     def listen(self, timeout_s: float) -> list[Heard]:
         """Return all messages that have arrived, in order. Wait up to `timeout_s` for the first
-        message."""
+        message.
+
+        Raises TransportError after the last message of a transport whose thread has ended. Otherwise
+        the graph would seem to be silent.
+        """
         heard = []
         try:
             heard.append(self._waiting.get(timeout=max(0.0, timeout_s)))
             while True:
                 heard.append(self._waiting.get_nowait())
         except Empty:
+            if not heard and not self._transport.lives:
+                raise TransportError("the transport's thread has ended") from None
             return heard
