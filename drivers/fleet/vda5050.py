@@ -54,6 +54,9 @@ INSTANT_COMMANDS: Final[Mapping[str, str]] = {
     "resume": "stopPause",
 }
 """The instant actions for commands of the core."""
+LATE_S: Final = 5.0
+"""Time (s) after which a state must show an action's order. A robot sends a state when it takes an
+order."""
 Age = Annotated[float, Meta(ge=1, le=120, extra={"unit": "s"})]
 TopicPart = Annotated[
     str,
@@ -127,6 +130,7 @@ class VdaRobot:
         self._serial = settings.known_as or name
         self._sent, self._acts = (0, 0), False
         self._order_id = self._instant_id = ""
+        self._ordered_at = 0.0
         self._headers = dict.fromkeys(topics, 0)
         self._state: Json = {}
         self._at: Pose | None = None
@@ -149,8 +153,8 @@ class VdaRobot:
         self._connected()
         heard = self._live_state()
         state = self._object("state", heard.payload)
-        driving = flag(state, "driving")
-        at = self._place(state, heard.at or 0.0, driving)
+        driving, said_at = flag(state, "driving"), heard.at or 0.0
+        at = self._place(state, said_at, driving)
         power = part(state, self._says.power)
         self._state, self._at = state, at
         refused, failed = self._in_vain(state)
@@ -163,6 +167,7 @@ class VdaRobot:
             fault=self._fault(state),
             taken_out=taken_out(state),
             refused=refused,
+            unanswered=not refused and self._is_lost(state, said_at),
             failed=failed,
             path=self._path(state),
             paused=flag(state, "paused") if "paused" in state else None,
@@ -324,6 +329,12 @@ class VdaRobot:
             return "; ".join(found), ""
         return "", "; ".join(found) if failed else ""
 
+    def _is_lost(self, state: Json, said_at: float) -> bool:
+        """Does a state that came long after an action's order not show this order? The order may have
+        been lost, or the robot has forgotten it."""
+        late = said_at >= self._ordered_at + LATE_S
+        return self._acts and not self._waits and late and text(state, "orderId") != self._order_id
+
     def _taken(self, state: Json) -> bool:
         """Does the state show that the robot has taken the last order, stop or pause?
 
@@ -365,7 +376,7 @@ class VdaRobot:
         within_m = self._settings.limits.arrived_m
         made = order(self._settings.version, command, self._at, node, within_m, (first, last))
         self._publish("order", made)
-        self._order_id = number
+        self._order_id, self._ordered_at = number, self._bus.now()
 
     def _instant(self, kind: str, action_id: str, parameters: Mapping[str, object]) -> None:
         blocking = "NONE" if self._settings.version == "3.0" else "HARD"

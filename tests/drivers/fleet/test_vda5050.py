@@ -372,6 +372,24 @@ def test_an_error_about_an_order_that_the_robot_has_not_taken_is_a_refusal(about
     assert in_vain(driver) == ("", "", ""), "the error is about the first attempt"
 
 
+def test_an_action_whose_order_no_later_state_shows_is_unanswered() -> None:
+    bus, driver = sent_to_clean()
+    told = []
+    for after_s, said in (
+        (4.9, STATE),  # a state of that time may have been on its way
+        (5.0, STATE),
+        (5.1, clean("RUNNING")),  # the order came late
+        (9.0, clean("RUNNING")),
+        (9.1, {**STATE, "driving": False}),  # the robot has forgotten the order
+    ):
+        bus.clock.now = after_s
+        bus.says("state", said)
+        told.append(driver.read().unanswered)
+    assert told == [False, True, False, False, True]
+    driver.write(RobotOutputs(RobotCommand(12, "act", 2, activity="clean")))
+    assert not driver.read().unanswered, "the second attempt has just been sent"
+
+
 def test_an_action_that_a_stop_has_ended_is_neither_refused_nor_failed() -> None:
     bus, driver = sent_to_clean()
     bus.says("state", clean("RUNNING"))
