@@ -24,7 +24,7 @@ from bridges.blackbox.entries import (
 )
 from bridges.blackbox.incident import Note
 from bridges.blackbox.value_codec import Tree, tree
-from bridges.kinds.shared.decision import EXPECTED, OperatorReset
+from bridges.kinds.shared.decision import EXPECTED, Fault, OperatorReset
 from bridges.kinds.shared.durations import AGES_AGO
 from bridges.messages import cdr
 from bridges.messages.heard import Heard
@@ -90,9 +90,7 @@ class Triggers:
             codes, before = _codes(faults), self._faults.get(step.subject, set())
             for code, detail in codes.items():
                 if code not in before:
-                    yield Note(
-                        step.at, FAULT, f"{code}: {detail}" if detail else code, step.subject
-                    )
+                    yield Note(step.at, FAULT, str(Fault(code, detail)), step.subject)
             self._faults[step.subject] = set(codes)
         expected = step.refused.partition(": ")[0] in EXPECTED or step.event == RESET
         if step.refused and not expected:

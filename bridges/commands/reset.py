@@ -6,6 +6,7 @@ import os
 import sys
 from pathlib import Path
 
+from bridges.kinds.shared.decision import Fault
 from bridges.messages.words import printable
 from bridges.runtime import order
 from bridges.system.directories import Directories
@@ -40,5 +41,5 @@ def _remains(places: Directories) -> str:
     """Return a line for each fault that the reset has not ended; "" if there is none."""
     status = order.status_of(places) or {}
     parts = [("", status), *((f"{n}: ", d) for n, d in status.get("devices", {}).items())]
-    found = ((n, fault) for n, part in parts for fault in part.get("faults", ()))
-    return "\n".join(printable(f"remains: {n}{f['code']}: {f['detail']}") for n, f in found)
+    found = ((n, Fault(f["code"], f["detail"])) for n, d in parts for f in d.get("faults", ()))
+    return "\n".join(printable(f"remains: {n}{fault}") for n, fault in found)
