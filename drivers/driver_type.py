@@ -38,6 +38,8 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
       (`bridges/kinds/shared/table.py`).
     - `claims(settings)` gives each register, path or topic that no other device may use, with its path
       in the YAML. The points in the wiring table need not be listed, because they are always claimed.
+    - `reads(settings)` gives each register or coil that tells the device's state, with its path in the
+      YAML. None of them may be one that a device writes.
     - `warnings(settings)` gives (path, text) for each valid setting that may be a mistake.
     - `notes(settings)` gives (path, text) for each setting that is no mistake, but whose effects the
       site should know.
@@ -55,6 +57,7 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
     describe: Callable[[Settings, Any], Iterable[tuple[str, str]]] = lambda settings, bus: ()
     tables: Callable[[Settings], Iterable[Table]] = lambda settings: ()
     claims: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
+    reads: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
     warnings: Callable[[Settings], Remarks] = lambda settings: ()
     notes: Callable[[Settings], Remarks] = lambda settings: ()
     unwired: Callable[[Settings], Iterable[str]] = lambda settings: ()

@@ -56,7 +56,7 @@ def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
     errors = [*_domains(configs), *taken(configs, one_machine), *_nowhere(configs)]
     gateways = [claim for config in configs for claim in _gateways(config)]
     warnings = [_shared(pair, claims) for pair in _twice(gateways)]
-    return Found(errors, [*warnings, *_unspoken(configs)])
+    return Found(errors, [*warnings, *_wires(configs), *_unspoken(configs)])
 
 
 def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
@@ -147,6 +147,8 @@ def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
         yield ExclusiveUse(config, f"the {what} '{name}'{of}", (kind.devices_key, name))
     for bus, where in _buses(config):
         if one_machine or not where.local:
+            for place, path in config.bus_type(bus).claims(config.buses[bus]):
+                yield ExclusiveUse(config, f"{place} of {where.text}", ("buses", bus, *path))
             for device in config.devices:
                 for place, path in _places(config, bus, device):
                     what = f"{place} of {where.text}"
@@ -190,6 +192,18 @@ def _domains(configs: Sequence[Config]) -> Iterator[Problem]:
             text = f"DDS domain {ours}, but {configs[0].path} is in domain {first}"
             place = ExclusiveUse(config, "", ("rmf", "domain_id"))
             yield place.problem(f"{text}: the daemons cannot hear each other")
+
+
+def _wires(configs: Sequence[Config]) -> Iterator[Problem]:
+    """Yield a warning for each file on another wire than an earlier file. ROS 2 and `auto` may be on
+    either wire."""
+    named = [config for config in configs if config.rmf.transport in ("dds", "zenoh")]
+    for config in named[1:]:
+        first, ours = named[0], config.rmf.transport
+        if ours != first.rmf.transport:
+            text = f"warning: transport {ours}, but {first.path} has {first.rmf.transport}"
+            place = ExclusiveUse(config, "", ("rmf", "transport"))
+            yield place.problem(f"{text}: without a bridge the daemons do not hear each other")
 
 
 def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:

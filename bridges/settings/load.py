@@ -35,15 +35,17 @@ from bridges.settings import names as named
 from bridges.settings.alarms import note_alarms
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
-from bridges.settings.plausible import milliseconds
+from bridges.settings.plausible import late_inputs, milliseconds
 from bridges.settings.renamed_keys import read_as_renamed
 from bridges.settings.top import MAPPING, keys_below, owner, top_keys, word
 from bridges.settings.wiring import (
     Use,
     WiringCheck,
     note_conflicts,
+    note_echoes,
     note_same_places,
     note_unknown_signals,
+    of_bus,
 )
 from bridges.yaml.parsing import Problem, SettingsError, YamlFile, compose, read
 from bridges.yaml.positions import MappingEntry, Spot, below, is_none, locate
@@ -108,6 +110,7 @@ class _DeviceReading:
         self._buses: dict[str, BusRead] = {}
         self._devices: dict[str, DeviceSettings] = {}
         self._uses: list[Use] = []
+        self._read: list[Use] = []
         self._on: dict[str, set[str | None]] = {}
         self._written: dict[str, list[str]] = {}
         self._warnings: list[Problem] = []
@@ -163,6 +166,7 @@ class _DeviceReading:
             note_alarms(self._page, self._devices, self._rmf, spot, of_rmf)
         note_same_places(self._page, self._buses.values())
         note_conflicts(self._page, self._uses, self._buses)
+        note_echoes(self._page, self._read, self._uses, self._buses)
         self._collect_bus_remarks()
 
     def _read_kind(self, entry: MappingEntry | None) -> None:
@@ -235,6 +239,7 @@ class _DeviceReading:
         for entry in self._names(spot, "bus"):
             bus = read_bus(entry, allowed, self._driver_name, self._values, self._page)
             self._buses[entry.name] = bus
+            self._uses += of_bus(entry.name, bus)
             for path, text in bus.remarks():
                 self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
 
@@ -327,6 +332,7 @@ class _DeviceReading:
                 for path, text in milliseconds(values.structs):
                     self._warn(locate(spot, path).where(), f"{spot.label}: {text}")
         self._uses += wiring.uses
+        self._read += wiring.read
         return settings
 
     def _check_signals(
@@ -339,9 +345,12 @@ class _DeviceReading:
     ) -> None:
         """Check the wires of a device whose settings are complete and valid."""
         wiring.wires(wires, spot)
-        wiring.claims(driver.claims(settings), spot)
+        wiring.claims([*driver.claims(settings)], spot)
+        wiring.reads(driver.reads(settings), spot)
         signals = [*(wire.signal for wire in wires), *driver.unwired(settings)]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
+        for path, text in late_inputs(settings, driver.debounce(settings)):
+            self._page.note(locate(spot, path).where(), text)
 
     def _collect_warnings(self, settings: DeviceSettings, spot: Spot, driver: AnyDriver) -> None:
         """Collect the warnings about a valid device."""

@@ -1,6 +1,6 @@
 """Finds implausible settings, such as durations in milliseconds and readings that are always stale."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from msgspec.inspect import StructType
@@ -58,6 +58,18 @@ def out_of_step(device: DeviceSettings, bus: object, others: Iterable[object] = 
                 f"{text}: write at least {lost_s:g}, so that one lost reply does not switch off the"
                 " output",
             )
+
+
+def late_inputs(device: DeviceSettings, debounce: Mapping[str, float]) -> Remarks:
+    """Yield a problem for each limit that is over before the input that it waits for can count.
+    `debounce` maps a signal to its debounce (s)."""
+    for signal, key, other in device.awaited():
+        limit_s: float = getattr(device.limits, key)  # type: ignore[attr-defined]
+        if signal in debounce and (not other or other in debounce):
+            late_s = debounce[signal] - debounce.get(other, 0.0)
+            if late_s >= limit_s:
+                text = f"{key} is {limit_s:g}, but {signal} counts {late_s:g} s late (debounce)"
+                yield ("limits", key), f"{text}: write a longer {key}, or a shorter debounce_s"
 
 
 def _stale_readings(device: DeviceSettings, scan_s: float) -> Remarks:

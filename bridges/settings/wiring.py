@@ -5,7 +5,7 @@ The module of the bus type defines how its points are spelt, and which wires are
 and `wire_problems` of its `BUS` in `drivers/hal/`).
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Literal
 
@@ -24,8 +24,9 @@ from drivers.hal.points import Input, Output, Wire
 
 
 class Use(Struct, frozen=True):
-    """A device's use of a point of a bus. `point`: the bus's spelling of the point. `written`: the
-    YAML's spelling."""
+    """A use of a point of a bus. `point`: the bus's spelling of the point. `written`: the YAML's
+    spelling. `claimed`: the point is a place or name that a driver or bus claims, and no wire's
+    point."""
 
     bus: str
     point: str
@@ -33,6 +34,7 @@ class Use(Struct, frozen=True):
     user: str
     node: Node
     direction: Literal["in", "out"] | None = None
+    claimed: bool = False
 
 
 class WiringCheck:
@@ -44,6 +46,7 @@ class WiringCheck:
     - `usable`: the bus types that the device's driver can use
     - `others`: the other buses on which the device has inputs
     - `written`: the points that stay on until the daemon itself switches them off
+    - `read`: the points of a device without wires that tell its state
     """
 
     def __init__(
@@ -63,6 +66,7 @@ class WiringCheck:
         self.uses: list[Use] = []
         self.others: set[str] = set()
         self.written: list[str] = []
+        self.read: list[Use] = []
         self.checks: dict[str, Check] = {"point": self._point, "other bus": self._other_bus}
 
     def _hal(self, bus: str) -> AnyBus | None:
@@ -152,13 +156,20 @@ class WiringCheck:
             for text in hal.wire_warnings(wire) if hal else ():
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
-    def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
+    def claims(self, places: Sequence[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
         """Record the things on the bus that only this device may use, such as CAN frames. A device
         without wires has such things in place of points. Each comes with its path in the YAML."""
+        self.uses += self._used(places, spot)
+        self.written += [text for text, _ in places]
+
+    def reads(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
+        """Record the places that tell the state of a device without wires."""
+        self.read += self._used(places, spot)
+
+    def _used(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> Iterator[Use]:
         for text, path in places:
             user = f"{self._device} {'.'.join(path)}"
-            self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
-            self.written.append(text)
+            yield Use(self._bus, text, text, user, locate(spot, path).where(), claimed=True)
 
     def reach(self) -> None:
         """Note each point that the bus does not have with its present settings."""
@@ -198,6 +209,13 @@ class WiringCheck:
             self._page.note(locate(spot, wire.path).key, f"'{name}': {text}")
 
 
+def of_bus(name: str, bus: BusRead) -> Iterator[Use]:
+    """Yield the places that the bus itself writes, and the names that only one daemon may use."""
+    for text, path in bus.hal.claims(bus.settings) if bus.hal and bus.where else ():
+        node = locate(bus.entry.spot(), path).where()
+        yield Use(name, text, text, f"{name} {'.'.join(path)}", node, claimed=True)
+
+
 def note_same_places(page: YamlFile, buses: Iterable[BusRead]) -> None:
     """Note each bus that uses the hardware of an earlier bus of the file: the same port, pins or
     gateway.
@@ -227,11 +245,25 @@ def note_conflicts(page: YamlFile, uses: Iterable[Use], buses: Mapping[str, BusR
             page.note(use.node, f"{taken}: {use.user} needs a point of its own")
 
 
+def note_echoes(
+    page: YamlFile, read: Iterable[Use], uses: Iterable[Use], buses: Mapping[str, BusRead]
+) -> None:
+    """Note each place that tells a state although a command of the file writes this place. The daemon
+    would take its own command for the device's answer."""
+    written = {_thing(use, buses.get(use.bus)): use for use in uses}
+    for use in read:
+        if other := written.get(_thing(use, buses.get(use.bus))):
+            line = other.node.start_mark.line + 1
+            text = f"{use.point} is written by {other.user} on line {line}"
+            page.note(use.node, f"{text}: a state needs a place that the device itself writes")
+
+
 def _thing(use: Use, bus: BusRead | None) -> tuple[str, str]:
     """Return the place and the name of the thing that is used. Two buses may have the same place."""
-    if bus and bus.hal and bus.where and (what := bus.hal.place(bus.settings, use.point)):
-        return bus.where.text, what
-    return use.bus, use.point
+    if bus is None or bus.hal is None or bus.where is None:
+        return use.bus, use.point
+    what = use.point if use.claimed else bus.hal.place(bus.settings, use.point)
+    return (bus.where.text, what) if what else (use.bus, use.point)
 
 
 def note_unknown_signals(

@@ -21,7 +21,7 @@ from drivers.charger.rules import judged, receiver_text
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.points import Point
-from drivers.hal.modbus.registers import WRITABLE, Unit, at, misplaced
+from drivers.hal.modbus.registers import TABLES, WRITABLE, Unit, at, misplaced
 
 POWER: Final = "power"
 
@@ -84,6 +84,17 @@ def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, 
         if misplaced(text, WRITABLE) is None:
             path = ("map", name, "at") if settings.map else ("unit",)
             yield str(at(settings.unit, text)), path
+
+
+def reads(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield each register, coil or discrete input that tells a value, with its path in the YAML. Yield
+    nothing while the map has problems."""
+    if any(PROFILE.problems(settings.profile, settings.map)):
+        return
+    for name, number in charger_map(settings).values.items():
+        if misplaced(number.at, TABLES) is None:
+            path = ("map", "values", name, "at") if settings.map else ("unit",)
+            yield from ((str(point), path) for point in number.points(settings.unit))
 
 
 def describe(settings: RegisterChargerSettings, bus: object) -> Iterator[tuple[str, str]]:
@@ -255,6 +266,7 @@ DRIVER = DriverType(
     describe=describe,
     tables=tables,
     claims=claims,
+    reads=reads,
     warnings=warnings,
     fake="hal_fakes.modbus.register_charger",
 )

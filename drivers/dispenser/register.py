@@ -132,6 +132,12 @@ def claims(settings: RegisterWorkcellSettings) -> Iterator[tuple[str, tuple[str,
             yield str(at(settings.unit, text)), ("map", part, "at")
 
 
+def reads(settings: RegisterWorkcellSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the register of the status, with its path in the YAML."""
+    if misplaced(settings.map.status.at, REGISTERS) is None:
+        yield str(points(settings)["status"]), ("map", "status", "at")
+
+
 def describe(settings: RegisterWorkcellSettings, bus: object) -> Iterator[tuple[str, str]]:
     """Yield rows for `check` with the Modbus point of each part of the map."""
     command = settings.map.command
@@ -233,6 +239,7 @@ DRIVER = DriverType(
     describe=describe,
     tables=tables,
     claims=claims,
+    reads=reads,
     warnings=lambda settings: blind(settings, busy=True),
     fake="hal_fakes.modbus.register_dispenser",
 )

@@ -86,6 +86,11 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
                 ("inputs",),
                 "a fire input needs on_fire, and on_fire needs a fire input: give or delete both",
             )
+        for signal in self.inputs.__struct_fields__:
+            place = getattr(self.inputs, signal)
+            if place and self.held and place.field == self.held.field:
+                text = "is the field of held, which shows the relay, and not the door"
+                yield ("inputs", signal, "field"), text
         if self.hold == self.release:
             yield ("release",), "is the same command as hold"
         yield from unaccepted(_unsafe(self), self.accept_unsafe)

@@ -20,7 +20,7 @@ from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import ModbusLines
 from drivers.hal.modbus.points import Point
-from drivers.hal.modbus.registers import WRITABLE, Unit, Word, at, misplaced, place
+from drivers.hal.modbus.registers import TABLES, WRITABLE, Unit, Word, at, misplaced, place
 from drivers.numbers import bits_on
 from drivers.profiles import Profile
 
@@ -84,8 +84,20 @@ def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...
     place_of_command = door_map(settings).command.at
     if misplaced(place_of_command, WRITABLE) is None:
         point = at(settings.unit, place_of_command, settings.base_address)
-        written = _command_in(settings)
+        written = _part_in(settings, "command")
         yield str(point), (*written, "at") if written else ("unit",)
+
+
+def reads(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the register of each part that the driver reads, with its path in the YAML. Yield nothing
+    for an invalid map."""
+    if any(PROFILE.problems(settings.profile, settings.map)):
+        return
+    for part, text in door_map(settings).places().items():
+        if part != "command" and misplaced(text, TABLES) is None:
+            found = _part_in(settings, part)
+            point = at(settings.unit, text, settings.base_address)
+            yield str(point), (*found, "at") if found else ("unit",)
 
 
 def describe(settings: RegisterDoorSettings, bus: object) -> Iterator[tuple[str, str]]:
@@ -123,7 +135,7 @@ def warnings(settings: RegisterDoorSettings) -> Remarks:
     into service."""
     yield from PROFILE.warnings(settings.profile, "watch the door move")
     if not door_map(settings).command.read_back:
-        written = _command_in(settings)
+        written = _part_in(settings, "command")
         path = (*written, "read_back") if written else ("profile",)
         yield (
             path,
@@ -131,11 +143,11 @@ def warnings(settings: RegisterDoorSettings) -> Remarks:
         )
 
 
-def _command_in(settings: RegisterDoorSettings) -> tuple[str, ...]:
-    """Return the path of the command in the YAML. Return () if the profile defines the command."""
+def _part_in(settings: RegisterDoorSettings, part: str) -> tuple[str, ...]:
+    """Return the path of a part of the map in the YAML. Return () if the profile defines the part."""
     if settings.map:
-        return "map", "command"
-    return ("changes", "command") if settings.changes and settings.changes.command else ()
+        return "map", part
+    return ("changes", part) if getattr(settings.changes, part, None) else ()
 
 
 def create(name: str, settings: RegisterDoorSettings, bus: ModbusBus) -> "RegisterDoor":
@@ -235,6 +247,7 @@ DRIVER = DriverType(
     describe=describe,
     tables=tables,
     claims=claims,
+    reads=reads,
     warnings=warnings,
     fake="hal_fakes.modbus.register_door",
 )

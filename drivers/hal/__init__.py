@@ -130,6 +130,8 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
       daemon's machine or the network dies. `places` are all places that the daemon writes.
     - `tables(settings)` gives further facts for `check`, such as the values that the bus writes to a
       watchdog.
+    - `claims(settings)` gives each place that the bus itself writes, and each name that only one daemon
+      may use, with its path in the YAML.
     - `paced(settings, devices, points)` gives remarks on settings that are too slow for these devices
       and for the canonical points that the devices use.
 
@@ -158,6 +160,7 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
         UnwatchedOutputs()
     )
     tables: Callable[[Settings], Iterable[Table]] = lambda settings: ()
+    claims: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
     paced: Callable[[Settings, Sequence[DeviceSettings], Iterable[str]], Remarks] = (
         lambda settings, devices, points: ()
     )

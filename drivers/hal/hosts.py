@@ -1,4 +1,4 @@
-"""Checks of a host's name or address, for Modbus TCP, HTTP and MQTT."""
+"""Checks of a host's name or address, and its one spelling, for Modbus TCP, HTTP and MQTT."""
 
 import ipaddress
 import re
@@ -22,6 +22,17 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
+
+
+def one_spelling(host: str) -> str:
+    """Return a host's name or address as it is compared with others: a name in lower case without a
+    final dot, the address 127.0.0.1 for this machine, and any other address in its shortest form."""
+    if is_loopback(name := host.lower().rstrip(".")):
+        return "127.0.0.1"
+    try:
+        return str(ipaddress.ip_address(name))
+    except ValueError:
+        return name
 
 
 def misspelt_host(host: str) -> str:

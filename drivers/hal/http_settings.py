@@ -7,7 +7,7 @@ import msgspec
 from bridges.kinds.shared.fields import AbsolutePath, Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers.hal import BusSettings, Needs, Where
-from drivers.hal.hosts import is_loopback
+from drivers.hal.hosts import is_loopback, one_spelling
 from drivers.hal.http_address import Path, base
 from drivers.hal.http_login import Login
 
@@ -135,4 +135,5 @@ def needs(settings: HttpSettings) -> Needs:
 
 def where(settings: HttpSettings) -> Where:
     """Return the controller's address, which is the hardware that the bus uses."""
-    return Where(base(settings.api_base).url(""), local=False)
+    api = base(settings.api_base)
+    return Where(api._replace(host=one_spelling(api.host)).url(""), local=False)

@@ -16,7 +16,7 @@ from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
 from drivers.hal.modbus import ModbusBus
 from drivers.hal.modbus.lines import ModbusLines
-from drivers.hal.modbus.registers import WRITABLE, Unit, misplaced
+from drivers.hal.modbus.registers import TABLES, WRITABLE, Unit, misplaced
 from drivers.hal.points import Clearing
 from drivers.lift import checks
 from drivers.lift.dry_contact import DOOR as BY_CONTACTS
@@ -136,6 +136,19 @@ def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...
         if place not in seen and misplaced(apart(place)[1], WRITABLE) is None:
             seen.add(place)
             yield str(point_at(settings.unit, place)), ("map", "commands", *path, "at")
+
+
+def reads(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the place of each part that the driver reads, with its path in the YAML. Leave out a part
+    whose bits are none of the commands' bits in the same register."""
+    written: dict[str, int] = {}
+    for _, place, bits in settings.map.commands.places():
+        written[place] = written.get(place, 0) | bits
+    for name, part in settings.map.parts().items():
+        place = place_of(part)
+        own = place in written and not part.mask & written[place]
+        if not own and misplaced(apart(place)[1], TABLES) is None:
+            yield str(point_at(settings.unit, place)), ("map", name, "at")
 
 
 def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str, str]]:
@@ -338,6 +351,7 @@ DRIVER = DriverType(
     describe=describe,
     tables=tables,
     claims=claims,
+    reads=reads,
     warnings=warnings,
     notes=notes,
     fake="hal_fakes.modbus.register_lift",

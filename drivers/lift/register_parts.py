@@ -66,6 +66,11 @@ class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
     ] = None
     unit: Annotated[Unit | None, UNIT] = None
 
+    @property
+    def mask(self) -> int:
+        """The bits of the register that hold the number."""
+        return self.word(0xFFFF)
+
     def number(self, word: int) -> int:
         """Extract the number from a register's value."""
         if not self.bits:
@@ -172,6 +177,11 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
         tells("`agv_mode` if the flag is valid only while AGV mode is on."),
     ] = None
     unit: Annotated[Unit | None, UNIT] = None
+
+    @property
+    def mask(self) -> int:
+        """The flag's bit in its register."""
+        return 1 << (self.bit or 0)
 
     def asserted(self, word: int) -> bool:
         """Return whether this value of the flag's register or bit means that the flag is asserted."""

@@ -144,6 +144,25 @@ def test_different_domains_are_an_error(capsys: pytest.CaptureFixture[str]) -> N
     )
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "warned"),
+    [("dds", "zenoh", True), ("dds", "dds", False), ("dds", "auto", False)],
+)
+def test_two_wires_are_warned_of(
+    capsys: pytest.CaptureFixture[str], first: str, second: str, warned: bool
+) -> None:
+    other = SECOND.replace("192.168.1.50", "192.168.1.51")
+    files = [
+        text.replace("domain_id: 3", f"domain_id: 3, transport: {wire}")
+        for text, wire in ((DOOR, first), (other, second))
+    ]
+    code, told = said(capsys, *files)
+    line = (
+        "b.yaml:3:32: warning: transport zenoh, but a.yaml has dds: without a bridge the daemons do"
+    )
+    assert (code, [one.startswith(line) for one in told[:1]]) == (0, [True] if warned else []), told
+
+
 def test_a_supervisor_of_a_door_without_a_file_is_an_error(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -71,6 +71,26 @@ def test_the_file_states_why_a_unit_may_keep_its_outputs(file: Path) -> None:
     ]
 
 
+QUICK = """\
+kind: door
+driver: dry_contact
+rmf: {{}}
+buses:
+  module:
+    {{type: modbus, tcp: {{host: 192.168.1.50}}, timeout_s: 0.1, retries: 0, scan_s: {scan_s},
+    module_watchdog: {{units: [1], habits: {{time_s: 0.5, refresh_s: 0.25,
+    arm: [{{at: coil 8, value: 1}}], armed: [{{at: coil 8, values: [1]}}],
+    refresh: {{at: coil 9, values: [0, 1]}}}}}}}}
+doors:
+  ward:
+    inputs:
+      opened: {{point: unit 1 discrete input 0, active: high}}
+      closed: {{point: unit 1 discrete input 1, active: high}}
+    outputs:
+      hold_open: {{point: unit 1 coil {out}, active: high}}
+"""
+
+
 REFUSED = {
     "a bus that is read too seldom": (
         door(f"{TCP}, scan_s: 2", limits="{stale_after_s: 1.5}"),
@@ -80,6 +100,20 @@ REFUSED = {
     "a timeout of nothing": (
         door(limits="{open_timeout_s: 0}"),
         "13:30: 'open_timeout_s' is 0: write a number from 1 to 86400 s",
+    ),
+    "a contact that counts after the limit that waits for it": (
+        door(limits="{open_timeout_s: 5}").replace(
+            "0, active: high}", "0, active: high, debounce_s: 5}", 1
+        ),
+        "13:30: open_timeout_s is 5, but opened counts 5 s late (debounce): write a longer",
+    ),
+    "a watchdog that trips between two scans": (
+        QUICK.format(scan_s=0.9, out=0),
+        "6:83: after a scan every 0.9 s and a refresh every 0.25 s the watchdog's 0.5 s are over",
+    ),
+    "an output that refreshes the watchdog": (
+        QUICK.format(scan_s=0.1, out=9),
+        "16:26: unit 1 coil 9 is used by module module_watchdog.habits on line 7: ward outputs.",
     ),
     "a topic that RMF has not": (
         door(rmf="{topics: {dor_states: x}}"),

@@ -78,6 +78,9 @@ def test_two_chips_are_two_places() -> None:
     [
         ("tcp: {host: 10.0.0.5}", "tcp: {host: 10.0.0.5, port: 502}", "10.0.0.5:502"),
         (SERIAL, SERIAL, "/dev/serial/by-id/x"),
+        ("tcp: {host: plc1}", "tcp: {host: PLC1.}", "plc1:502"),
+        ("tcp: {host: localhost}", "tcp: {host: 127.0.0.1}", "127.0.0.1:502"),
+        (SERIAL, SERIAL.replace("/by-id/", "//by-id/./"), "/dev/serial/by-id/x"),
     ],
 )
 def test_two_buses_on_one_line_or_gateway_are_refused(first: str, second: str, place: str) -> None:
@@ -128,6 +131,29 @@ def test_two_users_of_one_broker_may_switch_different_relays() -> None:
     at = text.index("again:")
     Path("two.yaml").write_text(text[:at] + text[at:].replace("a0b1c2d3e4f5", "001122334455"))
     assert list(load("two.yaml").buses) == ["building", "again"]
+
+
+def test_one_relay_with_two_timers_is_one_relay() -> None:
+    text = second_bus("door_mqtt.yaml", "doors")
+    at = text.index("again:")
+    assert "switches_off_after_s: 10" in text[at:]
+    Path("two.yaml").write_text(text[:at] + text[at:].replace("after_s: 10", "after_s: 12"))
+    with pytest.raises(SettingsError, match="relay is used by pharmacy_door"):
+        load("two.yaml")
+
+
+def test_one_client_id_at_one_broker_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """A broker ends the connection of the client that had the id before, so both would be deaf."""
+    text = second_bus("door_mqtt.yaml", "doors").replace("a0b1c2d3e4f5", "001122334455", 1)
+    client = "client_id: ward"
+    both = text.replace("type: mqtt", f"type: mqtt\n    {client}")
+    assert any("client id ward is used by" in one for one in problems(both))
+    for name, door in (("a.yaml", "A"), ("b.yaml", "B")):
+        one = (CONFIG / "door_mqtt.yaml").read_text().replace("pharmacy_door", door)
+        one = one.replace("a0b1c2d3e4f5", f"00112233445{name[0]}")
+        Path(name).write_text(one.replace("type: mqtt", f"type: mqtt\n    {client}"))
+    assert main(["check", "-q", "a.yaml", "b.yaml"]) == os.EX_CONFIG
+    assert "client id ward of" in capsys.readouterr().err
 
 
 def test_the_header_by_its_number_in_a_second_file_is_the_same_header(

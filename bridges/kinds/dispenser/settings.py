@@ -1,5 +1,6 @@
 """The part of a dispenser's or ingestor's YAML that does not depend on its wiring."""
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import msgspec
@@ -72,6 +73,11 @@ class WorkcellSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown
     def stale_after(self) -> float:
         """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
+
+    def awaited(self) -> Iterator[tuple[str, str, str]]:
+        """Yield the inputs for which the workcell's limits wait."""
+        yield "done", "settle_s", "busy"
+        yield "done", "cycle_limit_s", ""
 
     def problems(self) -> Remarks:
         """Yield the fields that contradict each other."""

@@ -1,5 +1,6 @@
 """The part of a door's YAML that does not depend on its wiring."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import msgspec
@@ -84,6 +85,11 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     def stale_after(self) -> float:
         """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
+
+    def awaited(self) -> Iterator[tuple[str, str, str]]:
+        """Yield the inputs for which the door's limits wait."""
+        yield "opened", "open_timeout_s", ""
+        yield "closed", "travel_s", ""
 
     def problems(self) -> Remarks:
         """Yield a problem for fields that contradict each other."""

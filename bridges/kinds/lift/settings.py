@@ -1,6 +1,6 @@
 """The part of a lift's YAML that does not depend on its wiring."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
 import msgspec
@@ -142,6 +142,13 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     def stale_after(self) -> float:
         """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
+
+    def awaited(self) -> Iterator[tuple[str, str, str]]:
+        """Yield the inputs for which the lift's limits wait."""
+        yield "agv_mode", "agv_timeout_s", ""
+        yield "door", "door_timeout_s", ""
+        yield "rear_door", "door_timeout_s", ""
+        yield "floor", "floor_timeout_s", ""
 
     def on_map(self) -> list[Place]:
         """List the floors, which RMF's map must have too."""

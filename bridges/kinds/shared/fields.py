@@ -7,6 +7,7 @@ when every field is present and has the right type. It does so even if `problems
 yielded something.
 """
 
+from collections.abc import Iterable
 from typing import Annotated
 
 import msgspec
@@ -88,6 +89,12 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         """Return the time (s) without a reading after which the device is out of service. Return None
         for a device without such a limit."""
         return None
+
+    def awaited(self) -> Iterable[tuple[str, str, str]]:
+        """Yield (signal, limit, other signal). The signal, or one of this group, must come within the
+        time of this key of `limits`. The time runs from a command; or, if the other signal is not "",
+        from the end of that signal."""
+        return ()
 
 
 class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

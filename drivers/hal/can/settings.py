@@ -1,5 +1,6 @@
 """The settings of a CAN bus in a device YAML (`type: can`)."""
 
+import os
 from typing import Annotated, Final
 
 import msgspec
@@ -90,7 +91,7 @@ def where(settings: CanSettings) -> Where:
     """Return the interface or port that the bus uses. Several programs can use a kernel's interface at
     the same time, but only one can use an adapter's port."""
     if settings.slcan:
-        return Where(settings.slcan.port, local=True, clients="one")
+        return Where(os.path.normpath(settings.slcan.port), local=True, clients="one")
     return Where(str(settings.socketcan), local=True)
 
 

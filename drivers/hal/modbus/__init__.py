@@ -23,6 +23,7 @@ from drivers.hal.modbus.bus import ModbusBus
 from drivers.hal.modbus.points import canonical, describe, wire_problems, wire_warnings
 from drivers.hal.modbus.settings import (
     ModbusSettings,
+    claims,
     needs,
     paced,
     tables,
@@ -61,4 +62,5 @@ BUS = BusType(
     unwatched=unwatched,
     paced=paced,
     tables=tables,
+    claims=claims,
 )

@@ -1,6 +1,7 @@
 """The settings of a Modbus bus in a device YAML (`type: modbus`): the units' address and the times."""
 
 import math
+import os
 from collections.abc import Iterable, Sequence
 from typing import Annotated
 
@@ -10,9 +11,10 @@ from bridges.kinds.shared.fields import DeviceSettings, Name, Period, tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.hal import BusSettings, Needs, UnwatchedOutputs, Where, serial_port
-from drivers.hal.modbus.registers import Unit
+from drivers.hal.hosts import one_spelling
+from drivers.hal.modbus.registers import Unit, at
 from drivers.hal.modbus.tcp_or_serial import Serial, Tcp
-from drivers.hal.modbus.watchdog import Watchdog
+from drivers.hal.modbus.watchdog import Habits, Watchdog
 
 Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 
@@ -52,6 +54,25 @@ class ModbusSettings(
                     ("without_watchdog", str(unit)),
                     f"unit {unit} is in module_watchdog too: delete one of the two",
                 )
+
+        yield from self._late_refresh()
+
+    def _late_refresh(self) -> Remarks:
+        """Yield a problem for a watchdog that trips although every scan is in time. The daemon
+        refreshes it after a scan, and scans at least every second."""
+        habits = self.habits()
+        if habits and min(self.scan_s, 1.0) + habits.refresh_s >= habits.time_s:
+            text = (
+                f"after a scan every {self.scan_s:g} s and a refresh every {habits.refresh_s:g} s the"
+                f" watchdog's {habits.time_s:g} s are over: lower scan_s"
+            )
+            yield ("scan_s",), text
+
+    def habits(self) -> Habits | None:
+        """Return the registers and times of the modules' watchdogs. Return None without a watchdog, or
+        with problems in its settings."""
+        watchdog = self.module_watchdog
+        return watchdog.chosen() if watchdog and not any(watchdog.problems()) else None
 
     def watched(self) -> Sequence[int]:
         """Return the units whose own watchdog switches their outputs off."""
@@ -99,8 +120,7 @@ def paced(
                 f" but readings are stale after {stale_s:g} s: lower timeout_s or retries"
             ),
         )
-    watchdog = settings.module_watchdog
-    habits = watchdog.chosen() if watchdog and not any(watchdog.problems()) else None
+    habits = settings.habits()
     if len(units) > 1 and habits:
         unseen_s = silent_s + settings.scan_s + habits.refresh_s
         if unseen_s >= habits.time_s:
@@ -113,6 +133,17 @@ def paced(
     if line and (round_s := len(units) * line.least_s) > settings.scan_s:
         text = f"to read every unit once takes {round_s:.2g} s at {line.baudrate} baud"
         yield ("scan_s",), f"{text}: raise scan_s or the baud rate"
+
+
+def claims(settings: ModbusSettings) -> Iterable[tuple[str, tuple[str, ...]]]:
+    """Yield each place that the bus writes for the modules' watchdogs, with its path in the YAML. If a
+    second daemon refreshed a watchdog, the module would not notice the death of the first daemon."""
+    habits, watchdog = settings.habits(), settings.module_watchdog
+    if habits and watchdog:
+        path = ("module_watchdog", "habits" if watchdog.habits else "profile")
+        writes = (*habits.arm, habits.refresh, *habits.rearm)
+        for unit in watchdog.units:
+            yield from ((text, path) for text in {str(at(unit, one.at)): None for one in writes})
 
 
 def tables(settings: ModbusSettings) -> Iterable[Table]:
@@ -150,9 +181,10 @@ def where(settings: ModbusSettings) -> Where:
     """Return the address of the gateway or module, or the port of the line. Only one daemon can open a
     port."""
     if settings.serial:
-        return Where(settings.serial.port, local=True, clients="one")
+        return Where(os.path.normpath(settings.serial.port), local=True, clients="one")
     assert settings.tcp  # `problems` has reported a missing address
-    return Where(f"{settings.tcp.host}:{settings.tcp.port}", local=False, clients=None)
+    host = one_spelling(settings.tcp.host)
+    return Where(f"{host}:{settings.tcp.port}", local=False, clients=None)
 
 
 def needs(settings: ModbusSettings) -> Needs:

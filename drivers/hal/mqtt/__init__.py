@@ -15,6 +15,7 @@ from drivers.hal import BusType
 from drivers.hal.mqtt.bus import Heard, MqttBus, open_bus
 from drivers.hal.mqtt.settings import (
     MqttSettings,
+    claims,
     needs,
     place,
     tables,
@@ -37,4 +38,5 @@ BUS = BusType(
     unfit=unfit,
     place=place,
     tables=tables,
+    claims=claims,
 )

@@ -11,9 +11,9 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from bridges.yaml.spelling import unknown
 from drivers.hal import BusSettings, Needs, Where
-from drivers.hal.hosts import misspelt_host
+from drivers.hal.hosts import misspelt_host, one_spelling
 from drivers.hal.mqtt.points import MqttPoint
-from drivers.hal.mqtt.topics import TOPICS_MAX
+from drivers.hal.mqtt.topics import TOPICS_MAX, RelayCommand
 from drivers.hal.points import Wire
 
 Confirmation = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
@@ -153,7 +153,7 @@ def _uses(point: MqttPoint) -> Iterator[tuple[str, object]]:
     if point.topic:
         yield "topic", ("state", point.topic, point.field, str(point.when))
     if point.command:
-        yield "command", ("command", point.command.topic, point.command.payload_on)
+        yield "command", ("command", *_relay(point.command))
 
 
 def _written(point: MqttPoint) -> Iterator[tuple[str, str]]:
@@ -206,7 +206,14 @@ def needs(settings: MqttSettings) -> Needs:
 def where(settings: MqttSettings) -> Where:
     """Return the broker's address, which is the hardware that the bus uses."""
     host, port = settings.address()
-    return Where(f"{host}:{port}", local=False)
+    return Where(f"{one_spelling(host)}:{port}", local=False)
+
+
+def claims(settings: MqttSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the daemon's client id, with its path in the YAML. A broker ends the connection of the
+    client that had the id before."""
+    if settings.client_id:
+        yield f"client id {settings.client_id}", ("client_id",)
 
 
 def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -> str | None:
@@ -229,7 +236,13 @@ def place(settings: MqttSettings, point: str) -> str | None:
     command. Return None for a state, because every device YAML may read a state."""
     whole = settings.wholes().get(point)
     command = whole.command if whole else None
-    return f"the command {command.topic} {command.payload_on}" if command else None
+    return f"the command {' '.join(_relay(command))}" if command else None
+
+
+def _relay(command: RelayCommand) -> tuple[str, str]:
+    """Return the topic and the message that switch a relay off. The message that switches the relay on
+    also has the time of the relay's timer."""
+    return command.topic, command.payload_off
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
