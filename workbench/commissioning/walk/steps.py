@@ -139,6 +139,12 @@ OFF: Final = {
 }
 
 
+def untestable(config: Config) -> str:
+    """Return the reason why nobody can test the outputs of this kind by hand. Return "" for a kind with
+    steps."""
+    return "" if config.kind in KINDS else f"a {config.kind} has no outputs to test by hand"
+
+
 def steps(config: Config, device: str) -> list[WalkStep]:
     """Return a step for every output of a device, in the order of testing."""
     return list(KINDS[config.kind](config.devices[device], config.outputs(device)))

@@ -8,9 +8,11 @@ from typing import Any, Final
 import pytest
 import yaml
 
+from bridges.kinds import kind_called, kind_names
+from bridges.kinds.shared.kind import Kind
 from bridges.settings.load import Config, load
 from workbench.commissioning.examples import CONFIG, device_yamls
-from workbench.commissioning.walk.steps import steps
+from workbench.commissioning.walk.steps import KINDS, OFF, steps, untestable
 
 HELD: Final = ("agv_mode_request", "door_open", "rear_door_open")
 LIFTS: Final = {
@@ -64,3 +66,26 @@ def test_a_lift_is_offered_the_outputs_that_check_lists(config: Config, device: 
     (rows,) = [table.rows for table in tables if table.title == "outputs"]
     listed = {row[0].partition(" ")[0] for row in rows}  # some drivers list each call
     assert {name.partition(" ")[0] for name in offered(config, device)} == listed
+
+
+@pytest.mark.parametrize("file", device_yamls(), ids=lambda file: file.stem)
+def test_every_shipped_device_has_its_steps_or_a_reason(file: Path) -> None:
+    config = load(file)
+    if untestable(config):
+        assert config.kind not in KINDS
+        return
+    assert config.kind in OFF
+    for device in config.devices:
+        drives = config.kind != "alarm" and not is_station(config)
+        assert bool(offered(config, device)) == drives
+
+
+def is_station(config: Config) -> bool:
+    """Return whether these are charging stations without contacts, which `send charger` tests."""
+    return config.kind == "charger" and config.driver != "dry_contact"
+
+
+def test_every_kind_with_hardware_but_a_fleet_can_be_walked() -> None:
+    with_hardware = {name for name in kind_names() if isinstance(kind_called(name), Kind)}
+    assert with_hardware - KINDS.keys() == {"fleet"}
+    assert OFF.keys() == KINDS.keys()
