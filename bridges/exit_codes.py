@@ -128,7 +128,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         0: "all is well",
         1: "warnings, or facts that cannot be seen (`--hardening`)",
         2: "something is wrong",
-        64: "the kill test was not confirmed",
+        64: "the kill test was not confirmed, or there is no such output",
         73: "the form cannot be written",
         **YAML,
         130: "Ctrl-C",
@@ -155,7 +155,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     "walk": {
         0: "every output is off",
         1: "an output is not verified off",
-        64: "no terminal, or no such device",
+        64: "no terminal, or no such device that can be tested",
         69: "the device is in use, or does not answer",
         73: "the record cannot be written",
         **YAML,

@@ -34,6 +34,8 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
     - `debounce(settings)` gives how long (s) a change must last, for each signal or group of signals.
     - `describe(settings, bus's settings)` gives rows (subject, meaning) for `check` if there are no
       wires.
+    - `commands(settings)` gives the names of the outputs that the device has, for a lift's driver
+      without wires. With wires, the outputs' signals have these names.
     - `tables(settings)` gives tables of codes, pulses and frames for `check`
       (`bridges/kinds/shared/table.py`).
     - `claims(settings)` gives each register, path or topic that no other device may use, with its path
@@ -55,6 +57,7 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
     wires: Callable[[Settings], Iterable[Wire]] = lambda settings: ()
     debounce: Callable[[Settings], Mapping[str, float]] = lambda settings: {}
     describe: Callable[[Settings, Any], Iterable[tuple[str, str]]] = lambda settings, bus: ()
+    commands: Callable[[Settings], Iterable[str]] = lambda settings: ()
     tables: Callable[[Settings], Iterable[Table]] = lambda settings: ()
     claims: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()
     reads: Callable[[Settings], Iterable[tuple[str, tuple[str, ...]]]] = lambda settings: ()

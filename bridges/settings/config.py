@@ -87,6 +87,12 @@ class Config(Struct, frozen=True):
         """Return a device's wiring table. The table is empty if the device's driver has no wires."""
         return list(self.driver_type(device_name).wires(self.devices[device_name]))
 
+    def outputs(self, device_name: str) -> set[str]:
+        """Return the names of a device's outputs: the signals of its output wires, and the commands
+        that a lift's driver without wires has. Other drivers without wires name no outputs."""
+        commands = self.driver_type(device_name).commands(self.devices[device_name])
+        return {w.signal for w in self.wires(device_name) if w.direction == "out"} | {*commands}
+
     def wires_on(self, bus: str, device_name: str) -> list[Wire]:
         """Return the rows of a device's wiring table that are on this bus. In the returned rows `bus`
         is ""."""

@@ -34,6 +34,9 @@ _OPEN = {"expected ',' or '}'": "{", "expected ',' or ']'": "["}
 _INDENT = re.compile(r"expected <block end>, but found '<block (mapping|sequence) start>'")
 _ODD = re.compile("[\u00a0\u00ad\u1680\u2000-\u200f\u2028-\u202f\u205f\u2060\u3000\ufeff]")
 _GLUED = re.compile(r"\s*(?:- )?([A-Za-z_][\w.-]*):(?=[^\s/:])(.*)")
+_VALUE = r"""(?:"[^"]*"|'[^']*'|\{.*\}|\[.*\]|[^\s"'{\[|>#].*?)"""
+_ENTRY = re.compile(rf""" *[^\s#'"{{\[-][^#'"{{\[]*: +{_VALUE}(?: +#.*)? *$""")
+"""A pattern for a line with a key and its whole value."""
 _QUOTED = re.compile(r'[:,\[{] *"[^"\n]*"\w+"')
 """A pattern for double quotes inside a text in double quotes: a closing quote, a word, and a third
 quote."""
@@ -54,8 +57,11 @@ def reason(error: MarkedYAMLError, text: str) -> str:
         return (
             f"a key beside the '- ' of line {since.line + 1}: delete that '- ', or indent this line"
         )
-    if where and (_INDENT.search(problem) or _SECOND in problem) and _follows_no_key(lines, where):
+    misplaced = _INDENT.search(problem) or _SECOND in problem
+    if where and misplaced and _follows_no_key(lines, where):
         return "the line above has no ': ': write a colon and a space after its key"
+    if where and misplaced and (outdented := _outdented(lines, where)):
+        return outdented
     if where and _INDENT.search(problem):
         return _indent(lines, where, since or where)
     if where and since and _QUOTED.search("\n".join(lines[since.line : where.line + 1])):
@@ -92,7 +98,7 @@ def _glued_in(lines: list[str], first: int) -> str:
 def _indent(lines: list[str], where: Mark, since: Mark) -> str:
     first: dict[int, int] = {}
     for number, line in enumerate(lines[since.line : where.line], since.line + 1):
-        if line.strip(" ") and not line.lstrip(" ").startswith("#"):
+        if line.strip(" ") and not _is_comment(line):
             first.setdefault(_spaces(line), number)
     above = " or ".join(f"{spaces} (line {first[spaces]})" for spaces in sorted(first))
     return (
@@ -101,14 +107,47 @@ def _indent(lines: list[str], where: Mark, since: Mark) -> str:
     )
 
 
+def _outdented(lines: list[str], where: Mark) -> str:
+    """Describe a deeper line below a line with a key and its whole value, if an earlier line has the
+    deeper line's indent. One of the two lines is indented wrongly. Return "" for other lines."""
+    above, here = _above(lines, where.line), _spaces(lines[where.line])
+    if above is None or not _ENTRY.match(lines[above]) or _spaces(lines[above]) >= here:
+        return ""
+    before = above
+    while (found := _above(lines, before)) is not None:
+        if _spaces(lines[found]) == here:
+            return (
+                f"line {above + 1} has its value already, so nothing can stand below it: indent line"
+                f" {above + 1} by {here} spaces like line {found + 1}, or this line by"
+                f" {_spaces(lines[above])} like line {above + 1}"
+            )
+        if _spaces(lines[found]) < _spaces(lines[above]):
+            return ""
+        before = found
+    return ""
+
+
+def _above(lines: list[str], number: int) -> int | None:
+    """Return the number of the last line above that is neither empty nor a comment. Return None if
+    there is none. Numbers begin at 0."""
+    kept = (n for n in reversed(range(number)) if lines[n].strip() and not _is_comment(lines[n]))
+    return next(kept, None)
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip(" ").startswith("#")
+
+
 def _spaces(line: str) -> int:
     return len(line) - len(line.lstrip(" "))
 
 
 def _follows_no_key(lines: list[str], where: Mark) -> bool:
     """Return whether the line above has the same indent, but no key."""
-    above, line = lines[max(where.line - 1, 0)], lines[where.line]
-    return _spaces(above) == _spaces(line) and ": " not in f"{above} " and where.line > 0
+    above = _above(lines, where.line)
+    if above is None or _spaces(lines[above]) != _spaces(lines[where.line]):
+        return False
+    return ": " not in f"{lines[above]} "
 
 
 def named(character: str) -> str:

@@ -368,6 +368,7 @@ DRIVER = DriverType(
     create=create,
     debounce=debounce,
     describe=describe,
+    commands=lambda settings: api_of(settings).commands.held(),
     tables=tables,
     claims=claims,
     warnings=warnings,

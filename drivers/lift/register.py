@@ -349,6 +349,7 @@ DRIVER = DriverType(
     create=create,
     debounce=debounce,
     describe=describe,
+    commands=lambda settings: [signal for signal, _, _ in settings.map.commands.singles()],
     tables=tables,
     claims=claims,
     reads=reads,

@@ -24,6 +24,7 @@ from bridges.settings import names as named
 from bridges.yaml.typo_hints import number_meant
 from tests.settings.reading import changed, problems_of
 
+NEWLINE = "\n"
 NBSP = "\u00a0"
 LIMIT = "limits: {open_s: 3, tries: 2}"
 
@@ -40,6 +41,40 @@ SLIPS = {
         [
             "9:4: wrong indent: 3 spaces before this line, 2 (line 7) or 4 (line 8) before the lines"
             " above: keys of one section have the same indent"
+        ],
+    ),
+    **{
+        f"a line that is too far to the left, and right lines below: {line.strip()}": (
+            changed("    codes: {1: in, 2: out}", line),
+            [
+                f"{15 + line.count(NEWLINE)}:{column}: line 14 has its value already, so nothing can"
+                " stand below it: indent line 14 by 4 spaces like line 12, or this line by 2 like"
+                " line 14"
+            ],
+        )
+        for line, column in (
+            ("  bus: header", 11),
+            ("  bus: &one header", 11),
+            ("  bus: header\n", 11),
+            ("  bus: header  # this one", 5),
+            ("  bus: header\n    # why", 5),
+            ('  bus: "header"', 5),
+            ("  bus: 'the # header'", 5),
+            ("  codes: {1: in, 2: out}", 5),
+            ("  lanes: [in, out]  # both", 5),
+        )
+    },
+    "a line that is too far to the right, below a line with a value": (
+        changed("    limits:", "      limits:"),
+        [
+            "15:7: line 14 has its value already, so nothing can stand below it: indent line 14 by 6"
+            " spaces like line 13, or this line by 4 like line 14"
+        ],
+    ),
+    "a line with an indent that no earlier line of its section has": (
+        changed("    limits:", "        limits:").replace("codes: {1: in, 2: out}", "bus: header"),
+        [
+            "15:15: a second ': ' here: indent the line like its neighbours, or put the text in quotes"
         ],
     ),
     "a key without a space after its colon": (

@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     - 0: all is well.
     - 1: there are warnings or unknown facts.
     - 2: something is wrong.
-    - 64: nobody confirmed the kill test.
+    - 64: nobody confirmed the kill test, or there is no such output.
     - 78: the YAML has an error.
     """
     log.start("CRITICAL")  # no log of errors, because the findings report them
@@ -142,11 +142,16 @@ def _building(file: str | None) -> "BuildingMap | None":
 def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
     """Return the reason to refuse the kill test. Return "" if the person confirmed the kill test."""
     from workbench.commissioning.doctor.victim import step_called
+    from workbench.commissioning.walk.steps import steps, untestable
 
+    if why := untestable(config):
+        return why
     try:
         args.device = device_of(config, args.device or next(iter(config.devices), None))
     except NoDevice as error:
         return str(error)
+    if not steps(config, args.device):
+        return f"{args.device} has no outputs to test by hand"
     step = step_called(config, args.device, args.output)
     if step is None:
         return f"{args.device} has no such output: rmf-bridge walk shows its outputs"

@@ -30,7 +30,7 @@ from workbench.commissioning.init.answers import (
 from workbench.commissioning.init.questions import QUESTIONS, Given, Question
 
 EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
-TABLE: Final = (*gateway.PLACES, *gateway.NUMBERS)
+TABLE: Final = (*gateway.PLACES, *gateway.NUMBERS, gateway.NO_CALL)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, meanings in gateway.NUMBERS.items():
         text = f"a gateway's numbers for {meanings}, such as 0,1,2"
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="N,N", help=text)
+    text = "a gateway's number for no call, such as 0; no floor may have this number"
+    parser.add_argument("--no-call-number", metavar="N", help=text)
     parser.add_argument("--fleet-config", metavar="FILE", help="RMF's config.yaml of the fleet")
     parser.add_argument("--graph", metavar="FILE", help="the fleet's navigation graph")
     parser.add_argument("--domain-id", help="RMF's ROS_DOMAIN_ID")
@@ -170,9 +172,8 @@ def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
 def _ask(question: Question, offered: str, given: Given, found: BuildingMap | None) -> str:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         option = question.name.replace("_", "-")
-        raise Impossible(
-            f"there is no terminal for questions: give --{option}, or --yes for '{offered}'"
-        )
+        accept = f", or --yes for '{offered}'" if offered else ""
+        raise Impossible(f"there is no terminal for questions: give --{option}{accept}")
     try:
         import questionary
     except ModuleNotFoundError:
@@ -191,7 +192,8 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
     if choices:
         first = offered if offered in choices else None
         return str(questionary.select(question.text, list(choices), default=first).unsafe_ask())
-    return str(questionary.text(f"{question.text} [{offered}]").unsafe_ask()) or offered
+    asked = f"{question.text} [{offered}]" if offered else question.text
+    return str(questionary.text(asked).unsafe_ask()) or offered
 
 
 def answers(given: Given) -> DraftAnswers:

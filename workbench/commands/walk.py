@@ -24,6 +24,7 @@ from bridges.settings.load import Config, SettingsError, load
 from bridges.system import log
 from drivers.hal import Bus, HalError
 from workbench.commissioning.manual_control import buses_of, driver_on, guarded
+from workbench.commissioning.walk.steps import OFF, steps, untestable
 from workbench.graph.which_device import NoDevice, device_of
 
 NOT_OFF = 1
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
     - 0: all outputs are off.
     - 1: the program could not verify that an output is off.
-    - 64: there is no terminal, or the YAML has no device.
+    - 64: there is no terminal, or the YAML has no device that a person can test.
     - 69: the device is in use.
     - 73: the record cannot be written.
     - 78: the YAML has an error.
@@ -66,6 +67,8 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_USAGE
     try:
         config = load(args.file)
+        if why := untestable(config):
+            raise NoDevice(why)
         device = device_of(config, args.device)
     except SettingsError as error:
         print("\n".join(map(str, error.problems)), file=sys.stderr)
@@ -137,7 +140,6 @@ def _on(
     from workbench.commissioning.walk import signed
     from workbench.commissioning.walk.bench import Bench, ContactReading
     from workbench.commissioning.walk.screen import Screen, keyboard, keys
-    from workbench.commissioning.walk.steps import OFF, steps
     from workbench.commissioning.walk.tap import Tap
 
     taps = {name: Tap(bus) for name, bus in buses.items()}

@@ -12,6 +12,7 @@ from bridges import cli
 from bridges.settings.load import load
 from tests.commands.terminal import Terminal
 from workbench.commissioning.init import WIRINGS
+from workbench.commissioning.init.gateway import PLACES
 
 MAP = """
 levels:
@@ -100,6 +101,7 @@ def test_a_gateway_is_drafted_from_its_register_table(tmp_path: Path) -> None:
     words += ["--floors", "G,1", "--address", "/dev/ttyS1", "--unit", "9", "--motion-at", "none"]
     words += ["--floor-at", "holding register 7", "--floor-numbers", "0,5"]
     words += ["--fire-alarm-at", "discrete input 4", "--request-at", "coil 2"]
+    words += ["--no-call-number", "255"]  # 0 calls the car to G
     assert cli.main(words) == 0
     assert list(load(file).devices) == ["Lift1"]
     written = safe_load(file.read_text())
@@ -110,8 +112,31 @@ def test_a_gateway_is_drafted_from_its_register_table(tmp_path: Path) -> None:
     assert found["fire_alarm"] == {"at": "discrete input 4", "active": "high"}
     assert found["agv_mode"] == {"at": "input register 3", "bit": 0, "active": "high"}
     assert found["commands"]["agv_mode_request"]["at"] == "coil 2"
-    assert found["commands"]["call"]["none"] == 1  # not 0, because a floor has the number 0
+    assert found["commands"]["call"]["none"] == 255
     assert "motion" not in found
+
+
+@pytest.mark.parametrize("floor_numbers", ["0,1,2", "1, 00, 2", "2,1,0"])
+def test_no_number_for_no_call_is_guessed_if_0_is_a_floors_number(
+    tmp_path: Path, floor_numbers: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "device.yaml"
+    words = ["init", str(file), "--kind", "lift", "--wiring", "gateway", "--yes"]
+    words += ["--floors", "G,1F,2F", "--floor-numbers", floor_numbers]
+    assert cli.main(words) == 64
+    assert capsys.readouterr().err == (
+        f"rmf-bridge init: 0 is a floor's number ({floor_numbers}), so it cannot mean no call: give"
+        " --no-call-number with the gateway's number for no call\n"
+    )
+    assert not file.exists()
+
+
+def test_0_means_no_call_if_no_floor_has_this_number(tmp_path: Path) -> None:
+    file = tmp_path / "device.yaml"
+    words = ["init", str(file), "--kind", "lift", "--wiring", "gateway", "--yes"]
+    assert cli.main([*words, "--floors", "1F,2F", "--floor-numbers", "1,10"]) == 0
+    call = safe_load(file.read_text())["lifts"]["Lift1"]["map"]["commands"]["call"]
+    assert call == {"at": "holding register 2", "codes": {1: "1F", 10: "2F"}, "none": 0}
 
 
 @pytest.mark.parametrize("contacts", ["high", "low"])
@@ -175,6 +200,20 @@ def test_a_missing_folder_is_reported_before_any_question_is_asked(
         ("--kind door --wiring gateway --door-numbers 0,0,1 --yes", "door_numbers is '0,0,1'"),
         ("--kind door --wiring gateway --floor-at x --yes", "--floor-at does not apply"),
         ("--kind lift --wiring gateway --encoding gray --yes", "--encoding does not apply"),
+        (
+            "--kind lift --wiring gateway --no-call-number 3 --yes",
+            "no_call_number is '3': write one whole number that is no floor's number (1,2,3)",
+        ),
+        ("--kind lift --wiring gateway --no-call-number 4,5 --yes", "no_call_number is '4,5'"),
+        ("--kind lift --wiring gateway --no-call-number off --yes", "no_call_number is 'off'"),
+        (
+            "--kind lift --wiring gateway --no-call-number 65536 --yes",
+            "with these answers, `check`",
+        ),
+        (
+            "--kind door --wiring gateway --no-call-number 0 --yes",
+            "--no-call-number does not apply",
+        ),
         ("--kind door --wiring gateway --hold-at 40001 --yes", "with these answers, `check` would"),
         ("--kind door --name= --yes", "'' is not a name for a door"),
     ],
@@ -214,6 +253,28 @@ def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None
     assert terminal.end() == 0
     assert list(load(file).devices) == ["ward"]
     assert load(file).rmf.domain_id == 5
+
+
+def test_it_asks_for_the_number_for_no_call_without_an_offer_if_0_is_a_floors_number(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "device.yaml"
+    given = {name.replace("_", "-"): place for name, (_, place) in PLACES.items()}
+    given |= {"kind": "lift", "name": "East", "wiring": "gateway", "address": "127.0.0.1"}
+    given |= {"unit": "1", "floors": "G,1F", "floor-numbers": "0,1", "domain-id": "0"}
+    given |= {"door-numbers": "0,1,2", "motion-numbers": "0,1,2"}
+    words = [word for option, value in given.items() for word in (f"--{option}", value)]
+    assert cli.main(["init", str(file), *words]) == 64
+    told = "there is no terminal for questions: give --no-call-number"
+    assert capsys.readouterr().err == f"rmf-bridge init: {told}\n"
+    terminal = Terminal("init", str(file), *words)
+    terminal.wait_for("The number for no call?")
+    terminal.type("9\r")
+    terminal.wait_for("is written")
+    assert terminal.end() == 0
+    assert b"[]" not in terminal.screen
+    call = safe_load(file.read_text())["lifts"]["East"]["map"]["commands"]["call"]
+    assert call["none"] == 9
 
 
 def test_ctrl_c_writes_nothing(tmp_path: Path) -> None:

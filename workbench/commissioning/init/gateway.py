@@ -27,6 +27,8 @@ NUMBERS: Final = {
     "motion_numbers": "stopped, up, down",
 }
 """Name of an answer -> the meanings of the numbers that the person gives, in order."""
+NO_CALL: Final = "no_call_number"
+"""Name of the answer for the number that the call register holds while there is no call."""
 
 
 def questions() -> dict[str, str]:
@@ -37,7 +39,13 @@ def questions() -> dict[str, str]:
         numbers = name.replace("_at", "_numbers")
         if numbers in NUMBERS:
             texts[numbers] = f"The numbers of {NUMBERS[numbers]}?"
-    return texts
+    return texts | {NO_CALL: "The number for no call?"}
+
+
+def offered_no_call(floor_numbers: str) -> str:
+    """Return 0 as the usual number for no call. Return "" if a floor has the number 0, because a wrong
+    number could call the car, and then only the gateway's register list tells the right number."""
+    return "" if 0 in _listed(floor_numbers) else "0"
 
 
 def lift(answers: DraftAnswers, floors: Sequence[str]) -> Iterator[str]:
@@ -61,10 +69,8 @@ def lift(answers: DraftAnswers, floors: Sequence[str]) -> Iterator[str]:
     if at["request_at"] != ABSENT:
         yield f"        agv_mode_request: {{at: {at['request_at']}, ask: 1, release: 0}}"
     yield f"        door_open: {{at: {at['hold_at']}, ask: 1, release: 0}}"
-    unused = next(
-        number for number in range(65536) if number not in _numbers(answers, "floor_numbers")
-    )
-    yield f"        call: {{at: {at['call_at']}, codes: {codes}, none: {unused}}}   # none: no call"
+    none = _no_call(answers)
+    yield f"        call: {{at: {at['call_at']}, codes: {codes}, none: {none}}}   # none: no call"
 
 
 def door(answers: DraftAnswers) -> Iterator[str]:
@@ -88,11 +94,33 @@ def _codes(answers: DraftAnswers, name: str, meanings: Sequence[str]) -> str:
 def _numbers(answers: DraftAnswers, name: str, many: int | None = None) -> list[int]:
     """Return the answer's numbers. Raises Impossible for an answer that is no list of numbers, and for
     too few or too many numbers."""
-    told = [part.strip() for part in answers.places[name].split(",")]
-    distinct = {int(part) for part in told if part.isascii() and part.isdigit()}
-    if len(distinct) < len(told) or (many is not None and len(told) != many):
+    numbers = _listed(answers.places[name])
+    if len(set(numbers) - {None}) < len(numbers) or (many is not None and len(numbers) != many):
         raise Impossible(
             f"{name} is '{answers.places[name]}': write a whole number for each of"
             f" {NUMBERS[name]}, each number once, with commas between"
         )
-    return [int(part) for part in told]
+    return [number for number in numbers if number is not None]
+
+
+def _no_call(answers: DraftAnswers) -> int:
+    """Return the number for no call. Raises Impossible without a number, and for a floor's number."""
+    told, floors = answers.places[NO_CALL], answers.places["floor_numbers"]
+    if not told.strip():
+        raise Impossible(
+            f"0 is a floor's number ({floors}), so it cannot mean no call: give --no-call-number"
+            " with the gateway's number for no call"
+        )
+    numbers = _listed(told)
+    if len(numbers) != 1 or numbers[0] is None or numbers[0] in _listed(floors):
+        raise Impossible(
+            f"{NO_CALL} is '{told}': write one whole number that is no floor's number ({floors})"
+        )
+    return numbers[0]
+
+
+def _listed(text: str) -> list[int | None]:
+    """Return the numbers of a text with commas between them. None stands for a part that is no whole
+    number."""
+    parts = [part.strip() for part in text.split(",")]
+    return [int(part) if part.isascii() and part.isdigit() else None for part in parts]

@@ -16,8 +16,8 @@ Given = dict[str, Any]
 class Question:
     """A question: its name in DraftAnswers, its text and its condition.
 
-    `offered` is the default answer. `choices` lists the possible answers; with (), any text is
-    possible.
+    `offered` is the default answer; "" if nobody may guess the answer. `choices` lists the possible
+    answers; with (), any text is possible.
     """
 
     name: str
@@ -52,6 +52,8 @@ def _in_table(name: str, given: Given) -> bool:
 def _offered(name: str, given: Given) -> str:
     if name in gateway.PLACES:
         return gateway.PLACES[name][1]
+    if name == gateway.NO_CALL:
+        return gateway.offered_no_call(given["floor_numbers"])
     if name != "floor_numbers":
         return "0,1,2"
     floors = [floor for floor in given["floors"].split(",") if floor.strip()]

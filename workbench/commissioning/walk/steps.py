@@ -13,12 +13,12 @@ from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftSample, Mot
 from bridges.settings.load import Config
 from workbench.commissioning.walk.core import WalkStep
 
-Wired = Collection[str] | None
-"""Names of the output lines. None means that the driver has no lines."""
+Outputs = Collection[str]
+"""Names of the outputs that the device has (`Config.outputs`)."""
 
 
-def _lift(settings: LiftSettings, wired: Wired) -> Iterator[WalkStep]:
-    if settings.agv_mode == "requested" and _has("agv_mode_request", wired):
+def _lift(settings: LiftSettings, outputs: Outputs) -> Iterator[WalkStep]:
+    if "agv_mode_request" in outputs:
         yield WalkStep(
             "agv_mode_request",
             "asks the lift for AGV mode",
@@ -38,6 +38,8 @@ def _lift(settings: LiftSettings, wired: Wired) -> Iterator[WalkStep]:
         )
     for side in dict.fromkeys(stop.side for stop in settings.stops().values()):
         name = "door_open" if side is Side.FRONT else "rear_door_open"
+        if name not in outputs:
+            continue
         yield WalkStep(
             name,
             f"opens the {side.value} door and holds it",
@@ -46,10 +48,6 @@ def _lift(settings: LiftSettings, wired: Wired) -> Iterator[WalkStep]:
             _opened(side),
             _not_standing,
         )
-
-
-def _has(signal: str, wired: Wired) -> bool:
-    return wired is None or signal in wired
 
 
 def _hazard(sample: LiftSample) -> str:
@@ -72,7 +70,7 @@ def _opened(side: Side) -> Callable[[LiftSample], bool]:
     return lambda s: (s.door if side is Side.FRONT else s.rear_door) is DoorReading.OPEN
 
 
-def _door(settings: object, wired: Wired) -> Iterator[WalkStep]:
+def _door(settings: object, outputs: Outputs) -> Iterator[WalkStep]:
     def fire(sample: DoorSample) -> str:
         return "the fire alarm is on" if sample.fire else ""
 
@@ -86,8 +84,8 @@ def _door(settings: object, wired: Wired) -> Iterator[WalkStep]:
     )
 
 
-def _charger(settings: object, wired: Wired) -> Iterator[WalkStep]:
-    if wired is None:
+def _charger(settings: object, outputs: Outputs) -> Iterator[WalkStep]:
+    if "enable" not in outputs:
         return  # a person tests a charger without contacts with `rmf-bridge send charger`
 
     def at_fault(sample: ChargerSample) -> str:
@@ -103,7 +101,7 @@ def _charger(settings: object, wired: Wired) -> Iterator[WalkStep]:
     )
 
 
-def _workcell(settings: object, wired: Wired) -> Iterator[WalkStep]:
+def _workcell(settings: object, outputs: Outputs) -> Iterator[WalkStep]:
     def hinders(sample: WorkcellSample) -> str:
         if sample.fault or sample.errors:
             return f"it shows a fault {'; '.join(sample.errors)}".rstrip()
@@ -123,11 +121,11 @@ def _fault(sample: ChargerSample) -> bool:
     return sample.activity.value in ("error", "unknown")
 
 
-KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[WalkStep]]]] = {
+KINDS: Final[dict[str, Callable[[Any, Outputs], Iterator[WalkStep]]]] = {
     "lift": _lift,
     "door": _door,
     "charger": _charger,
-    "alarm": lambda settings, wired: iter(()),  # an alarm panel has no outputs
+    "alarm": lambda settings, outputs: iter(()),  # an alarm panel has no outputs
     "dispenser": _workcell,
     "ingestor": _workcell,
 }
@@ -141,8 +139,12 @@ OFF: Final = {
 }
 
 
+def untestable(config: Config) -> str:
+    """Return the reason why nobody can test the outputs of this kind by hand. Return "" for a kind with
+    steps."""
+    return "" if config.kind in KINDS else f"a {config.kind} has no outputs to test by hand"
+
+
 def steps(config: Config, device: str) -> list[WalkStep]:
     """Return a step for every output of a device, in the order of testing."""
-    wires = config.wires(device)
-    wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None
-    return list(KINDS[config.kind](config.devices[device], wired))
+    return list(KINDS[config.kind](config.devices[device], config.outputs(device)))

@@ -32,6 +32,7 @@ from tests.commands.terminal import Terminal
 from tests.runtime.site import Module, command, daemon, environment
 from tests.waiting import PATIENCE_S, wait_until
 from workbench.commissioning.doctor.served import served
+from workbench.commissioning.examples import CONFIG
 
 READS = {1, 2, 3, 4}
 """Modbus functions that only read."""
@@ -260,6 +261,26 @@ def test_without_a_terminal_or_an_output_there_is_no_kill_test(
     assert cli.main(["doctor", str(module.file), "--kill-test", *options]) == os.EX_USAGE
     assert why in capsys.readouterr().err
     assert module.relay() == []
+
+
+@pytest.mark.parametrize(
+    ("file", "why"),
+    [
+        ("robots_http.yaml", "a fleet has no outputs to test by hand\n"),
+        ("robots_vda5050.yaml", "a fleet has no outputs to test by hand\n"),
+        ("lift_supervisor.yaml", "a lift_supervisor has no outputs to test by hand\n"),
+        ("door_supervisor.yaml", "a door_supervisor has no outputs to test by hand\n"),
+        ("charger_coordinator.yaml", "a charger_coordinator has no outputs to test by hand\n"),
+        ("alarm_panel.yaml", "Main panel has no outputs to test by hand\n"),
+        ("charger_register.yaml", "charger_f has no outputs to test by hand\n"),
+    ],
+)
+def test_without_outputs_there_is_no_kill_test(
+    file: str, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["doctor", str(CONFIG / file), "--kill-test", "--yes", "--listen", "0"]
+    assert cli.main(words) == os.EX_USAGE
+    assert capsys.readouterr().err == why
 
 
 def test_a_bad_yaml_is_reported_as_check_reports_it(

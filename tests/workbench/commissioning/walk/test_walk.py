@@ -16,6 +16,12 @@ from tests.processes import running
 from tests.runtime.on_two_buses import DOOR
 from tests.runtime.site import Module, daemon, environment
 from tests.waiting import wait_until
+from workbench.commissioning.examples import CONFIG
+
+NO_OUTPUTS = (
+    *("robots_http.yaml", "robots_traffic_light.yaml", "robots_vda5050.yaml"),
+    *("lift_supervisor.yaml", "door_supervisor.yaml", "charger_coordinator.yaml"),
+)
 
 
 def walk(module: Module, tmp_path: Path) -> Terminal:
@@ -109,6 +115,31 @@ def test_without_a_terminal_it_switches_nothing(
 ) -> None:
     assert cli.main(["walk", str(module.file)]) == os.EX_USAGE
     assert "walk needs a terminal" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("file", NO_OUTPUTS)
+def test_a_kind_without_outputs_is_refused_in_one_sentence(file: str, tmp_path: Path) -> None:
+    words = ("--simulate", "--runtime-dir", tmp_path / "run")
+    terminal = Terminal("walk", CONFIG / file, *words, environ=environment())
+    terminal.wait_for(f"a {load(CONFIG / file).kind} has no outputs to test by hand\r\n")
+    assert terminal.end() == os.EX_USAGE
+    assert terminal.screen.count(b"\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "reading"),
+    [("alarm_panel.yaml", "sources fire_panel no"), ("charger_register.yaml", "activity idle")],
+)
+def test_a_device_without_outputs_to_test_shows_its_readings(
+    file: str, reading: str, tmp_path: Path
+) -> None:
+    words = ("--simulate", "--runtime-dir", tmp_path / "run", "--record", tmp_path / "record")
+    terminal = Terminal("walk", CONFIG / file, *words, environ=environment())
+    terminal.wait_for(reading)
+    terminal.type("q")
+    terminal.wait_for("every output verified off")
+    assert terminal.end() == 0
+    assert json.loads((tmp_path / "record.json").read_text())["outputs"] == []
 
 
 def test_a_walk_shows_the_contacts_of_both_buses(tmp_path: Path) -> None:
