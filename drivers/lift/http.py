@@ -70,6 +70,12 @@ class HttpLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_f
             yield from checks.named("call", path, commands.calls, levels)
         yield from _rear_door(self, found)
         yield from _lift_id(self)
+        if commands.cancel and self.limits.call_pulse_s is not None:
+            text = (
+                "after the pulse the daemon would withdraw the call by cancel, with the car on its"
+                " way: delete call_pulse_s, because a call is one request"
+            )
+            yield ("limits", "call_pulse_s"), text
         told, asks = found.state.shows("agv_mode"), bool(commands.agv_mode_request)
         request = _path(self, "commands", "agv_mode_request")
         yield from checks.by_call(self, told, asks, request)

@@ -452,6 +452,7 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
         ("method: digest}", "method: plain}", "digest"),
         ("moving: [OPENING", "shut: [OPENING", "unknown key 'shut'"),
         ("up: [up], ", "", "needs values for moving, or else values for both up and down"),
+        ("{stale_after_s: 3}", "{stale_after_s: 3, call_pulse_s: 0.5}", "delete call_pulse_s"),
         ("path: /lifts/1/cancel", 'path: /lifts/1/call, body: \'{"floor": "{level}"}\'', "same"),
     ],
 )
@@ -460,6 +461,11 @@ def test_a_wrong_api_is_refused_with_its_remedy(
 ) -> None:
     found = texts_of(tmp_path / "lift.yaml", changed(old, new, EXAMPLE.read_text()))
     assert any(wanted in text for text in found), found
+
+
+def test_a_call_that_nothing_can_withdraw_may_have_a_pulse() -> None:
+    without = {name: command for name, command in COMMANDS.items() if name != "cancel"}
+    assert list(settings_of(commands=without, limits={"call_pulse_s": 0.5}).problems()) == []
 
 
 def test_a_profile_without_the_lifts_id_is_refused(tmp_path: Path) -> None:
