@@ -356,6 +356,25 @@ def test_an_off_that_fails_keeps_no_other_off_waiting() -> None:
     assert (gateway.sent, gateway.insisted) == (["/call/none", "/agv/off", "/door/off"], 1)
 
 
+def test_a_call_that_cannot_be_withdrawn_keeps_back_the_next_call_only() -> None:
+    gateway = Gateway()
+    lift = create("lift", settings_of(), gateway)
+    lift.open()
+    lift.read()
+    lift.write(CALL)
+    gateway.answer["out"] = {"agv": True}
+    gateway.broken = {"/call/none"}
+    gateway.sent.clear()
+    for outputs in (HOLD, HOLD, msgspec.structs.replace(CALL, call="B1")):
+        lift.read()
+        with pytest.raises(DriverError, match="/call/none is refused"):
+            lift.write(outputs)
+    assert gateway.sent == [
+        *("/call/none", "/agv/on", "/door/on") * 2,
+        *("/door/off", "/call/none", "/agv/on"),
+    ]
+
+
 def test_an_off_that_hangs_does_not_come_first_again() -> None:
     """After a hanging call the bus refuses the others for a while."""
 
