@@ -327,6 +327,13 @@ class Points:
             self._lines.renew(kept)
         self._written = wanted
 
+    def off(self, signals: Iterable[str]) -> None:
+        """Switch these outputs off, even if they should be off already. Try each one, even if another
+        one fails. Raises HalError. The next `write` writes all outputs again."""
+        self._written = None
+        found = [self._out[signal] for signal in signals]
+        self._lines.write({point: wire.level(False) for wire, point in found})
+
     def flash(self, signal: str) -> None:
         """Request a pulse of this output, which the module ends by itself. From now on the output's
         level is unknown.
