@@ -162,6 +162,12 @@ def is_number(wires: Iterable[Wire]) -> bool:
     return all(re.search(r"\bbit\b", wire.point, re.IGNORECASE) for wire in wires)
 
 
+def are_pins(wires: Iterable[Wire]) -> bool:
+    """Return whether these wires are at pins of the header. Pins switch within microseconds of each
+    other. At other buses each output needs a request of its own."""
+    return all(re.match(r"BCM|J8:", wire.point) for wire in wires)
+
+
 class Lines(Protocol):
     """The contacts and relays of one device on one bus, as raw levels. The values 1 and True mean
     high."""
