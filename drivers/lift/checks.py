@@ -256,6 +256,8 @@ def _calls(wiring: LiftWiring) -> Remarks:
         if number == 0 or number >> len(code.bits):
             why = "0 is no call" if number == 0 else f"{number} does not fit on the bits"
             yield ("call_code", "codes", str(number)), why
+    for number, text in codes.called_twice(code.codes):
+        yield ("call_code", "codes", str(number)), text
 
 
 def _partial_call(wiring: LiftWiring, table: Mapping[str, Wire]) -> Remarks:

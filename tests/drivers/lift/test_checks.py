@@ -115,6 +115,10 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
         ],
     ),
     (
+        calls_by({1: "B1", 2: "G", 3: "1", 4: "1"}),
+        [("call_code.codes.4", "1 is called by 3 already: give each landing one number")],
+    ),
+    (
         {"inputs": inputs(door_opened=None, door_closed=None)},
         [("inputs", "no contact of this door: give door, or both door_opened and door_closed")],
     ),
