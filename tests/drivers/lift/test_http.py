@@ -471,6 +471,11 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
         ("method: digest}", "method: plain}", "digest"),
         ("moving: [OPENING", "shut: [OPENING", "unknown key 'shut'"),
         ("up: [up], ", "", "needs values for moving, or else values for both up and down"),
+        (
+            "{field: outputs.door}",
+            "{field: outputs.robot}",
+            "shows agv_mode_request too, so it does not prove that door_open is off",
+        ),
         ("{stale_after_s: 3}", "{stale_after_s: 3, call_pulse_s: 0.5}", "delete call_pulse_s"),
         ("path: /lifts/1/cancel", 'path: /lifts/1/call, body: \'{"floor": "{level}"}\'', "same"),
     ],
