@@ -162,6 +162,12 @@ def is_number(wires: Iterable[Wire]) -> bool:
     return all(re.search(r"\bbit\b", wire.point, re.IGNORECASE) for wire in wires)
 
 
+def are_pins(wires: Iterable[Wire]) -> bool:
+    """Return whether these wires are at pins of the header. Pins switch within microseconds of each
+    other. At other buses each output needs a request of its own."""
+    return all(re.match(r"BCM|J8:", wire.point) for wire in wires)
+
+
 class Lines(Protocol):
     """The contacts and relays of one device on one bus, as raw levels. The values 1 and True mean
     high."""
@@ -326,6 +332,13 @@ class Points:
             self._written = None
             self._lines.renew(kept)
         self._written = wanted
+
+    def off(self, signals: Iterable[str]) -> None:
+        """Switch these outputs off, even if they should be off already. Try each one, even if another
+        one fails. Raises HalError. The next `write` writes all outputs again."""
+        self._written = None
+        found = [self._out[signal] for signal in signals]
+        self._lines.write({point: wire.level(False) for wire, point in found})
 
     def flash(self, signal: str) -> None:
         """Request a pulse of this output, which the module ends by itself. From now on the output's

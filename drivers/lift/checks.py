@@ -8,7 +8,7 @@ from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import Hazard, Side
 from bridges.kinds.shared.alarming import alarm_problems
 from bridges.kinds.shared.remarks import Remarks
-from drivers.hal.points import Wire, is_number
+from drivers.hal.points import Wire, are_pins, is_number
 from drivers.lift import codes
 from drivers.lift.broken_lines import floor_warnings, unsafe_codes
 from drivers.lift.table import MOTION, input_rows, wires
@@ -66,6 +66,7 @@ def warnings(wiring: LiftWiring) -> Remarks:
             ("floor_code",),
             f"{confused}: ask for a parity line, or for codes that differ in at least two lines",
         )
+    yield from _partial_call(wiring, table)
     yield from needlessly_accepted(unsafe(wiring), wiring.accept_unsafe)
 
 
@@ -255,6 +256,26 @@ def _calls(wiring: LiftWiring) -> Remarks:
         if number == 0 or number >> len(code.bits):
             why = "0 is no call" if number == 0 else f"{number} does not fit on the bits"
             yield ("call_code", "codes", str(number)), why
+    for number, text in codes.called_twice(code.codes):
+        yield ("call_code", "codes", str(number)), text
+
+
+def _partial_call(wiring: LiftWiring, table: Mapping[str, Wire]) -> Remarks:
+    """Yield a warning if some bits of a landing's code are the code of another landing, and the bits
+    cannot be switched together."""
+    code = wiring.call_code
+    if code is None or are_pins(wire for s, wire in table.items() if s.startswith("call_bit")):
+        return
+    for number, level in code.codes.items():
+        for part, other in code.codes.items():
+            if part & number == part and other != level:
+                yield (
+                    ("call_code",),
+                    f"each bit is switched by a request of its own, so a call to {level} ({number}) may"
+                    f" show {part}, which calls {other}, for a moment: if the controller also takes"
+                    " calls from a register, use driver: register with call",
+                )
+                return
 
 
 def _doors(wiring: LiftWiring) -> Remarks:

@@ -1,7 +1,7 @@
 """Converts between a number and the lines that show the number together. The encoding is binary, Gray
-or BCD. The least significant line always comes first."""
+or BCD. The least significant line always comes first. Also checks the numbers of calls."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 Encoding = Literal["binary", "gray", "bcd"]
@@ -36,6 +36,15 @@ def lines(prefix: str, number: int, width: int) -> dict[str, bool]:
     """Return the levels of the binary lines `<prefix>_bit0`, `<prefix>_bit1`… for this number. True
     means that the line is asserted."""
     return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}
+
+
+def called_twice(calls: Mapping[int, str]) -> Iterator[tuple[int, str]]:
+    """Yield (number, problem) for each number that calls a landing which an earlier number calls
+    already. `calls` gives the landing for each number."""
+    first: dict[str, int] = {}
+    for number, level in calls.items():
+        if (other := first.setdefault(level, number)) != number:
+            yield number, f"{level} is called by {other} already: give each landing one number"
 
 
 def _from_gray(pattern: int) -> int:

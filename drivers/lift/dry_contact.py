@@ -5,10 +5,12 @@ The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 
 from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion, Side
 from bridges.kinds.shared.remarks import Remarks
+from drivers import DriverError
 from drivers.driver_type import DriverType
 from drivers.hal.points import Points, PointsBus
 from drivers.lift import checks as lift_checks
@@ -78,10 +80,20 @@ class DryContactLift(OnPoints):
         return self._sample
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every output as `outputs` says. Outputs that go off come first."""
+        """Set every output as `outputs` says. Outputs that go off come first.
+
+        If this fails during a call by a code, switch the code's bits off, because a part of the code
+        may be the code of another landing.
+        """
         if outputs != self._outputs:
             self._outputs, self._lines = outputs, encode(self._settings, outputs)
-        self._points.write(self._lines)
+        try:
+            self._points.write(self._lines)
+        except DriverError:
+            if self._settings.call_code and outputs.call is not None:
+                with suppress(DriverError):  # the first error tells more
+                    self._points.off(self._settings.call_code.lines(None))
+            raise
 
 
 def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, bool]:

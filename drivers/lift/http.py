@@ -70,6 +70,12 @@ class HttpLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_f
             yield from checks.named("call", path, commands.calls, levels)
         yield from _rear_door(self, found)
         yield from _lift_id(self)
+        if commands.cancel and self.limits.call_pulse_s is not None:
+            text = (
+                "after the pulse the daemon would withdraw the call by cancel, with the car on its"
+                " way: delete call_pulse_s, because a call is one request"
+            )
+            yield ("limits", "call_pulse_s"), text
         told, asks = found.state.shows("agv_mode"), bool(commands.agv_mode_request)
         request = _path(self, "commands", "agv_mode_request")
         yield from checks.by_call(self, told, asks, request)
@@ -277,24 +283,29 @@ class HttpLift:
 
     def write(self, outputs: LiftOutputs) -> None:
         """Set every command to its level in `outputs`. Commands that go off come first, each even if
-        another one fails; then nothing goes on. Renew the commands that have a timer."""
+        another one fails; then nothing goes on. Renew the commands that have a timer.
+
+        A call that cannot be withdrawn keeps back only the next call, because the door must be held and
+        AGV mode must last meanwhile.
+        """
         wanted = {name: _wants(outputs, name) for name in self._held}
         idle = [name for name in wanted if not wanted[name] and self._told.get(name) is not False]
         offs: dict[str, Callable[[], None]]
         offs = {name: partial(self._switch, name, on=False) for name in idle}
         if self._called not in (None, outputs.call):
             offs["call"] = self._withdraw
-        every, failed = Every(), self._failed
+        every, withdrawal, failed = Every(), Every(), self._failed
         self._failed = ""
         for name in sorted(offs, key=lambda name: name == failed):
-            with every.one():
+            with (withdrawal if name == "call" else every).one():
                 offs[name]()
-            if every.failure is not None:  # the next attempt begins with another one
+            if every.failure or withdrawal.failure:  # the next attempt begins with another one
                 self._failed = self._failed or name
         every.check()
         for name in (n for n in HELD if wanted.get(n)):
             if self._held[name].is_renewed() or not self._told.get(name):
                 self._switch(name, on=True)
+        withdrawal.check()
         if outputs.call is not None and not self._sure:
             self._call(outputs.call)
 

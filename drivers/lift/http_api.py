@@ -111,7 +111,8 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     def problems(self) -> Remarks:
         """Yield a problem if the YAML gives both `call` and `calls`, and if the body of `call` lacks
-        the landing. Yield a problem for a request that occurs twice."""
+        the landing. Yield a problem for a request that occurs twice, and for a flag that shows two
+        commands."""
         if self.call and self.calls:
             yield ("calls",), "calls and call are alternatives: delete one of the two"
         if self.call and LEVEL not in (self.call.body or ""):
@@ -125,6 +126,14 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
             if same and path[-1] != "release":
                 yield path, f"{'.'.join(path)} is the same request as {same[0]}"
             seen.append((".".join(path), call))
+        shown = {name: command.shown for name, command in self.held().items() if command.shown}
+        for name, flag in shown.items():
+            other = next(before for before, same in shown.items() if same == flag)
+            if other != name:
+                text = (
+                    f"shows {other} too, so it does not prove that {name} is off: use another field"
+                )
+                yield (name, "shown"), text
 
 
 class LiftApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -12,6 +12,7 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers.hal.modbus.map_parts import WrittenLevels, WrittenPlace
 from drivers.hal.modbus.registers import Place, Unit, Word
+from drivers.lift import codes
 from drivers.lift.register_parts import (
     UNIT,
     DoorField,
@@ -57,10 +58,12 @@ class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields
 
     def problems(self) -> Remarks:
         """Yield a problem for a place that cannot be written. Yield a problem for a landing whose
-        number means "no call"."""
+        number means "no call", and for a landing with two numbers."""
         yield from super().problems()
         if self.none in self.codes:
             yield ("codes", str(self.none)), f"{self.none} means no call already (none)"
+        for number, text in codes.called_twice(self.codes):
+            yield ("codes", str(number)), text
 
 
 class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -138,8 +141,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             at = place_of(command)
             found[at] = found.get(at, 0) | command.value(signal in asserted)
         if self.call:
-            codes = {level: number for number, level in self.call.codes.items()}
-            value = self.call.none if call is None else codes[call]
+            numbers = {level: number for number, level in self.call.codes.items()}
+            value = self.call.none if call is None else numbers[call]
             found[place_of(self.call)] = found.get(place_of(self.call), 0) | value
         return found
 

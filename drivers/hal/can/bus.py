@@ -48,7 +48,7 @@ class CanBus(Bus):
         self.settings = settings
         self.now = clock
         self.where = settings.slcan.port if settings.slcan else str(settings.socketcan)
-        self._link = _link(settings, self.where, vendor)
+        self._link = _link(settings, self.where, vendor, clock)
         self._jitter = jitter
         self._backoffs = [Backoff(clock, jitter)]
         self._wanted: list[tuple[FrameFilter, Hear]] = []
@@ -198,10 +198,12 @@ class CanBus(Bus):
         return self._backoffs[0].failed(text)
 
 
-def _link(settings: CanSettings, where: str, vendor: "Vendor | None") -> "Link":
+def _link(
+    settings: CanSettings, where: str, vendor: "Vendor | None", clock: Callable[[], float]
+) -> "Link":
     """Return the link to the bus. Only this function imports python-can."""
     from drivers.hal.can.link import Link, slcan, socketcan
 
     place = settings.slcan
     made = (lambda: slcan(place)) if place else (lambda: socketcan(where))
-    return Link(vendor or made, where, settings.timeout_s)
+    return Link(vendor or made, where, settings.timeout_s, clock)

@@ -19,6 +19,7 @@ import errno
 import logging
 import os
 import select
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
@@ -91,9 +92,17 @@ class SlcanAdapter(slcanBus):
 
 
 class Link:
-    """One bus. The link opens the bus again when needed. `where` is the bus's name in errors."""
+    """One bus. The link opens the bus again when needed. `where` is the bus's name in errors. Tests
+    replace `clock`, which gives seconds."""
 
-    def __init__(self, vendor: Vendor, where: str, timeout_s: float) -> None:
+    def __init__(
+        self,
+        vendor: Vendor,
+        where: str,
+        timeout_s: float,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._now = clock
         self._vendor = vendor
         self._where = where
         self._timeout_s = timeout_s
@@ -111,14 +120,16 @@ class Link:
         self._readable = _selecting(self._bus)
 
     def receive(self, wait_s: float) -> Frame | Trouble | None:
-        """Return the next frame or trouble. Return None if nothing comes within `wait_s`. Raises
-        LinkDown."""
+        """Return the next frame or trouble. Return None if nothing comes within `wait_s`. Lines and
+        frames without a meaning do not prolong the wait. Raises LinkDown."""
         assert self._bus is not None
+        deadline = self._now() + wait_s
         for _ in range(IN_ONE_GO):
+            left_s = max(0.0, deadline - self._now())
             try:
-                if self._readable and not self._readable(wait_s):
+                if self._readable and not self._readable(left_s):
                     return None
-                message = self._bus.recv(0 if self._readable else wait_s)
+                message = self._bus.recv(0 if self._readable else left_s)
             except FAILURES as error:
                 raise LinkDown(self._explained(error)) from error
             if message is None and self._readable is None:

@@ -37,6 +37,12 @@ def binary(**changes: Any) -> dict[str, Any]:
     return {"floor_code": {**code, **changes}}
 
 
+def calls_by(codes: dict[int, str], pin: str = "") -> dict[str, Any]:
+    """Return calls as a number on coils, or on pins whose names begin with `pin`."""
+    lines = [coil(n) | ({"point": f"{pin}{n}"} if pin else {}) for n in (20, 21, 22)]
+    return {"calls": {}, "call_code": {"bits": lines, "codes": codes}}
+
+
 TWO_FLOORS = {"B1": {}, "G": {}, "1": {}, "G_r": {"level": "G", "side": "rear"}}
 REAR = {"rear_door_opened": line(50), "rear_door_closed": line(51)}
 SERVICE_CODES = {0: "normal", 1: "agv_mode", 2: "fire_alarm"}
@@ -107,6 +113,10 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
             ("call_code.codes.0", "0 is no call"),
             ("call_code.codes.2", "2 does not fit on the bits"),
         ],
+    ),
+    (
+        calls_by({1: "B1", 2: "G", 3: "1", 4: "1"}),
+        [("call_code.codes.4", "1 is called by 3 already: give each landing one number")],
     ),
     (
         {"inputs": inputs(door_opened=None, door_closed=None)},
@@ -375,6 +385,19 @@ def test_accepting_wiring_that_does_not_exist_is_pointed_out() -> None:
                 )
             ],
         ),
+        (
+            calls_by({1: "B1", 2: "G", 3: "1"}),
+            [
+                (
+                    "call_code",
+                    "each bit is switched by a request of its own, so a call to 1 (3) may show 1,"
+                    " which calls B1, for a moment: if the controller also takes calls from a register,"
+                    " use driver: register with call",
+                )
+            ],
+        ),
+        (calls_by({1: "B1", 2: "G", 4: "1"}), []),
+        (calls_by({1: "B1", 2: "G", 3: "1"}, "BCM"), []),
         (binary(codes={1: "B1", 3: "G", 4: "1"}, parity=line(41, total="even")), []),
         (binary(codes={3: "B1", 5: "G", 6: "1"}), []),
         (

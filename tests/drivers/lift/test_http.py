@@ -356,6 +356,25 @@ def test_an_off_that_fails_keeps_no_other_off_waiting() -> None:
     assert (gateway.sent, gateway.insisted) == (["/call/none", "/agv/off", "/door/off"], 1)
 
 
+def test_a_call_that_cannot_be_withdrawn_keeps_back_the_next_call_only() -> None:
+    gateway = Gateway()
+    lift = create("lift", settings_of(), gateway)
+    lift.open()
+    lift.read()
+    lift.write(CALL)
+    gateway.answer["out"] = {"agv": True}
+    gateway.broken = {"/call/none"}
+    gateway.sent.clear()
+    for outputs in (HOLD, HOLD, msgspec.structs.replace(CALL, call="B1")):
+        lift.read()
+        with pytest.raises(DriverError, match="/call/none is refused"):
+            lift.write(outputs)
+    assert gateway.sent == [
+        *("/call/none", "/agv/on", "/door/on") * 2,
+        *("/door/off", "/call/none", "/agv/on"),
+    ]
+
+
 def test_an_off_that_hangs_does_not_come_first_again() -> None:
     """After a hanging call the bus refuses the others for a while."""
 
@@ -452,6 +471,12 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
         ("method: digest}", "method: plain}", "digest"),
         ("moving: [OPENING", "shut: [OPENING", "unknown key 'shut'"),
         ("up: [up], ", "", "needs values for moving, or else values for both up and down"),
+        (
+            "{field: outputs.door}",
+            "{field: outputs.robot}",
+            "shows agv_mode_request too, so it does not prove that door_open is off",
+        ),
+        ("{stale_after_s: 3}", "{stale_after_s: 3, call_pulse_s: 0.5}", "delete call_pulse_s"),
         ("path: /lifts/1/cancel", 'path: /lifts/1/call, body: \'{"floor": "{level}"}\'', "same"),
     ],
 )
@@ -460,6 +485,11 @@ def test_a_wrong_api_is_refused_with_its_remedy(
 ) -> None:
     found = texts_of(tmp_path / "lift.yaml", changed(old, new, EXAMPLE.read_text()))
     assert any(wanted in text for text in found), found
+
+
+def test_a_call_that_nothing_can_withdraw_may_have_a_pulse() -> None:
+    without = {name: command for name, command in COMMANDS.items() if name != "cancel"}
+    assert list(settings_of(commands=without, limits={"call_pulse_s": 0.5}).problems()) == []
 
 
 def test_a_profile_without_the_lifts_id_is_refused(tmp_path: Path) -> None:

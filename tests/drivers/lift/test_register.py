@@ -133,6 +133,11 @@ MODEL = "looks like a manual's number, and these begin at 1"
             " each command bits of its own",
         ),
         ("none: 0", "none: 4", "47:43: 'codes': 4 means no call already (none)"),
+        (
+            "4: L4}\n          none",
+            "4: L4, 5: L4}\n          none",
+            "47:50: 'codes': L4 is called by 4 already: give each landing one number",
+        ),
         (", 4: L4}\n          none", "}\n          none", "47:11: 'codes': no code for L4"),
         (
             "    floors:",
