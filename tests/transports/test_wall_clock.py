@@ -82,3 +82,25 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
     assert [text for text in caplog.messages if "clock" in text] == [
         "clock_set_back node=node by_s=315576000.0"
     ]
+
+
+@pytest.mark.parametrize("transport", [pytest.param("dds", marks=pytest.mark.dds), ROS2])
+def test_a_node_that_joins_again_does_not_take_its_own_alarm_for_another_nodes(
+    transport: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ahead = [0.0]
+    monkeypatch.setattr(threaded, "ahead_s", lambda: ahead[-1])
+    node, other = joining(transport, domain)("node"), joining(transport, domain)("other")
+    of_others, everything = list[d.Message](), list[d.Message]()
+    node.subscribe(FIRE_ALARM_TRIGGER, of_others.append, others_only=True)
+    node.subscribe(FIRE_ALARM_TRIGGER, everything.append)
+    ours = node.publisher(FIRE_ALARM_TRIGGER)
+    ours.publish(d.Bool(True))
+    wait_until(lambda: everything == [d.Bool(True)], "the node has heard its own alarm")
+    ahead.append(-10 * YEAR_S)
+    wait_until(lambda: len(everything) == 2, "the node has joined again and heard its own alarm")
+    other.publisher(FIRE_ALARM_TRIGGER).publish(d.Bool(False))
+    wait_until(lambda: d.Bool(False) in of_others, "another node's message is heard")
+    node.close()
+    other.close()
+    assert of_others == [d.Bool(False)]

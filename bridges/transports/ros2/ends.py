@@ -50,8 +50,10 @@ class Ends:
         self.subscriptions: tuple[Ros2Subscription, ...] = ()
 
     def __iter__(self) -> "Iterator[Ros2Publisher | Ros2Subscription]":
-        yield from self.publishers
+        """Yield the subscriptions first. When the node joins again, a publisher repeats its retained
+        messages, and each subscription that must ignore them must already know them as our own."""
         yield from self.subscriptions
+        yield from self.publishers
 
     def heard_back(self, topic: AnyTopic) -> "list[Ros2Subscription]":
         """Return this node's subscriptions that must ignore our own messages on the topic, although DDS
