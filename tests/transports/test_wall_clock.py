@@ -1,12 +1,13 @@
 """Steps of the wall clock. After a step backwards, `dds` and `ros2` join the graph again."""
 
 import logging
+import threading
 from contextlib import suppress
 
 import pytest
 
 from bridges.messages import definitions as d
-from bridges.messages.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
+from bridges.messages.topics import DOOR_STATES, FIRE_ALARM_TRIGGER, LIFT_REQUESTS
 from bridges.transports import threaded
 from bridges.transports.threaded import WallClock, ahead_s
 from bridges.transports.transport import TransportError
@@ -104,3 +105,31 @@ def test_a_node_that_joins_again_does_not_take_its_own_alarm_for_another_nodes(
     node.close()
     other.close()
     assert of_others == [d.Bool(False)]
+
+
+@pytest.mark.parametrize("transport", [pytest.param("dds", marks=pytest.mark.dds), ROS2])
+def test_a_supervisor_that_joins_again_repeats_its_alarm_but_no_request_to_a_lift(
+    transport: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ahead = {"supervisor-clock": 0.0}
+    monkeypatch.setattr(
+        threaded, "ahead_s", lambda: ahead.get(threading.current_thread().name, 0.0)
+    )
+    supervisor, lift = joining(transport, domain)("supervisor"), joining(transport, domain)("lift")
+    asked, rang = list[d.LiftRequest](), list[d.Bool]()
+    subscription = lift.subscribe(LIFT_REQUESTS, asked.append)
+    lift.subscribe(FIRE_ALARM_TRIGGER, rang.append)
+    requests = supervisor.publisher(LIFT_REQUESTS)
+    alarm = supervisor.publisher(FIRE_ALARM_TRIGGER)
+    wait_until(lambda: requests.matched() and subscription.matched(), "the lift hears requests")
+    requests.publish(d.LiftRequest(session_id="a ride that ends"))
+    alarm.publish(d.Bool(True))
+    wait_until(lambda: asked and rang, "the lift hears the request and the alarm")
+    ahead["supervisor-clock"] = -10 * YEAR_S
+    wait_until(lambda: len(rang) == 2, "the supervisor has joined again and repeats its alarm")
+    wait_until(lambda: requests.matched() and subscription.matched(), "the lift hears requests")
+    requests.publish(d.LiftRequest(session_id="a new ride"))
+    wait_until(lambda: asked[-1].session_id == "a new ride", "the lift hears the new request")
+    supervisor.close()
+    lift.close()
+    assert [request.session_id for request in asked] == ["a ride that ends", "a new ride"]

@@ -180,11 +180,19 @@ def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_ag
     alarm = lift.publisher(FIRE_ALARM_TRIGGER)
     alarm.publish(d.Bool(True))
     wait_until(lambda: talk.arrives("before"), "RMF hears the lift")
+    requests, asked = lift.publisher(LIFT_REQUESTS), list[str]()
+    rmf.subscribe(LIFT_REQUESTS, lambda request: asked.append(request.session_id))
+    ended = d.LiftRequest(session_id="a ride that ends")
+    wait_until(lambda: asked or peer.sent(requests, ended), "a request is heard")
+    heard = len(asked)
     machine.addresses = frozenset({(2, "10.0.0.8")})
     wait_until(
         lambda: "network addresses=10.0.0.8" in caplog.messages, "the new address is noticed"
     )
     wait_until(lambda: talk.arrives("after"), "RMF hears the lift again")
+    new = d.LiftRequest(session_id="a new ride")
+    wait_until(lambda: new.session_id in asked or peer.sent(requests, new), "a request is heard")
+    assert set(asked[heard:]) == {"a new ride"}
     rang: list[d.Bool] = []
     site.node("late", router.endpoint, mode="client").subscribe(FIRE_ALARM_TRIGGER, rang.append)
     wait_until(lambda: rang, "a node that comes late hears the retained message")

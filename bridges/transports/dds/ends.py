@@ -51,8 +51,7 @@ class DdsPublisher:
         self._withdraw = withdraw
         self._writer: DataWriter = None
         self._reader_thread = reader_thread
-        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[Message] = deque(maxlen=depth)
+        self._retained: deque[Message] = deque(maxlen=topic.repeats)
         self._sample: type[IdlSample] | None = None
 
     watched = DDSStatus.OfferedIncompatibleQos

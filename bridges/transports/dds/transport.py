@@ -65,8 +65,8 @@ class DdsTransport(Threaded):
     if the node cannot join the domain.
 
     The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
-    again when the machine's addresses change. The caller keeps its publishers and subscriptions, and
-    publishers repeat their retained messages.
+    again when the machine's addresses change. The caller keeps its publishers and subscriptions.
+    Publishers repeat the retained messages that still hold (`Topic.repeats`).
     """
 
     speaks = "dds"

@@ -84,8 +84,7 @@ class Ros2Publisher:
         self._withdraw = withdraw
         self._using = threading.Lock()
         self._end: RosPublisher | None = None
-        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[Message] = deque(maxlen=depth)
+        self._retained: deque[Message] = deque(maxlen=topic.repeats)
 
     def create(self, node: Node) -> None:
         """Make rclpy's publisher. Send the retained messages again, for late joiners."""

@@ -43,7 +43,8 @@ class Ros2Transport(Threaded):
     environment says otherwise. Raises TransportError if the node cannot join the graph.
 
     The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
-    again when the machine's addresses change. Publishers then repeat their retained messages.
+    again when the machine's addresses change. Publishers then repeat the retained messages that still
+    hold (`Topic.repeats`).
     """
 
     speaks = "ros2"

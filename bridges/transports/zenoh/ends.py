@@ -124,12 +124,11 @@ class ZenohPublisher(ZenohEnd):
         self._lives = lives
         self._deaf = deaf
         self._sent = 0
-        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[bytes] = deque(maxlen=depth)
+        self._retained: deque[bytes] = deque(maxlen=topic.repeats)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Declare this publisher in a session. Send the retained messages again, for nodes that join
-        late."""
+        """Declare this publisher in a session. Send the retained messages that still hold again, for
+        nodes that join late."""
         place = self._placed(session, keys, "MP", number)
         self._release = keys.release
         self._end = end = self._declared(session, place.key)
@@ -168,7 +167,7 @@ class ZenohPublisher(ZenohEnd):
     ) -> zenoh.Publisher | ext.AdvancedPublisher:
         # With DROP, zenoh waits at most 1 ms for room in the queue to a peer.
         congestion, reliable = CongestionControl.DROP, Reliability.RELIABLE
-        if not self._retained.maxlen:
+        if self.topic.publish.durability == "volatile":
             return session.declare_publisher(
                 key, congestion_control=congestion, reliability=reliable
             )
@@ -177,7 +176,7 @@ class ZenohPublisher(ZenohEnd):
             key,
             congestion_control=congestion,
             reliability=reliable,
-            cache=ext.CacheConfig(max_samples=self._retained.maxlen),
+            cache=ext.CacheConfig(max_samples=self.topic.publish.depth),
             sample_miss_detection=ext.MissDetectionConfig(
                 heartbeat=None, sporadic_heartbeat=HEARTBEAT_S
             ),
