@@ -5,10 +5,13 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import closing
+from itertools import count
 from typing import Any
 
 import pytest
 from cyclonedds import builtin
+from cyclonedds.pub import DataWriter
+from cyclonedds.pub import Publisher as DdsPublisher
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
@@ -57,6 +60,29 @@ def test_noise_on_our_ports_disturbs_nobody(domain: int, join_dds: Join, echo: N
     publisher.publish(after)
     wait_until(lambda: received[-1] == after, "a message after the noise comes back")
     assert (publisher.matched(), node.dropped) == (1, {})
+
+
+class Unreadable(str):
+    """A text that is not UTF-8 on the wire."""
+
+    def encode(self, *_: object) -> bytes:
+        return b"\xff\xfe"
+
+
+def test_an_announcement_that_cannot_be_read_is_skipped_and_those_beside_it_are_not(
+    join_dds: Join, observer: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    foreign = DdsPublisher(observer, Qos(Policy.Partition([Unreadable("lab")])))
+    writers = [DataWriter(foreign, DdsTopic(observer, "anything", discovery.Gid))]
+    stranger = join_dds("stranger")
+    stranger.subscribe(LIFT_STATES.named("x"), print)
+    stranger.publisher(Topic("door_states", d.LiftState))
+    here = join_dds("here")
+    here.subscribe(Topic("door_states", d.DoorState), print)
+    wait_until(here.faults, "the announcement beside it is read")
+    assert [code for code, _ in here.faults()] == ["TYPE_MISFIT"]
+    assert (here.lives, here.dropped) == (True, {"DCPSPublication": len(writers)})
+    assert not [text for text in caplog.messages if "reader_failed" in text]
 
 
 def test_a_peer_with_another_type_is_named_once(
@@ -211,16 +237,21 @@ def test_a_reader_that_fails_joins_again_and_hears_again(
     ]
 
 
+@pytest.mark.parametrize("each", [1, 2], ids=["at each turn", "after each joining"])
 def test_a_reader_that_keeps_failing_is_reported_as_dead(
-    join_dds: Join, monkeypatch: pytest.MonkeyPatch
+    join_dds: Join, monkeypatch: pytest.MonkeyPatch, each: int
 ) -> None:
     node = join_dds("here")
     assert isinstance(node, DdsTransport)
     node.subscribe(LIFT_STATES, lambda state: None)
     publisher = join_dds("there").publisher(LIFT_STATES)
 
+    whole, turns = node._read_once, count(1)
+
     def fails() -> None:
-        raise MemoryError("none left")
+        if next(turns) % each == 0:
+            raise MemoryError("none left")
+        whole()
 
     monkeypatch.setattr("bridges.transports.dds.transport.LOOK_EVERY_S", 0.01)
     monkeypatch.setattr(node, "_read_once", fails)

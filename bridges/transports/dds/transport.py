@@ -15,6 +15,7 @@ import ctypes
 import logging
 import os
 import threading
+import time
 from collections.abc import Callable
 from typing import Final, TypeVar
 from weakref import WeakValueDictionary
@@ -84,7 +85,7 @@ class DdsTransport(Threaded):
         self._subscriptions: tuple[DdsSubscription, ...] = ()
         self._loopback = loopback
         self._joined = False
-        self._dds_peers = DdsPeers(self._peers)
+        self._dds_peers = DdsPeers(self._peers, self.dropped)
         try:
             with self._reporting(f"{CANNOT_JOIN} {domain_id}"):
                 self._join()
@@ -202,13 +203,12 @@ class DdsTransport(Threaded):
             self._node.add_reader(entity)
 
     def _read(self) -> None:
-        failures = 0
-        while not self._closed and failures < notices.FAILURES:
+        failures = notices.Failures()
+        while not self._closed and not failures.too_many:
             try:
                 self._read_once()
-                failures = 0
             except Exception as error:  # noqa: BLE001 - logged by _recover
-                failures += 1
+                failures.count(time.monotonic())
                 self._recover(error)
 
     def _read_once(self) -> None:
