@@ -19,10 +19,17 @@ from cyclonedds.topic import Topic as DdsTopic
 from bridges.messages import definitions as d
 from bridges.messages.releases import DEFAULT, NEWEST
 from bridges.messages.rihs01 import type_hash, type_name
-from bridges.messages.topics import FLEET_STATES, LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages.topics import (
+    FIRE_ALARM_TRIGGER,
+    FLEET_STATES,
+    LIFT_REQUESTS,
+    LIFT_STATES,
+    Topic,
+)
 from bridges.transports.cyclone import LOOPBACK
 from bridges.transports.dds import discovery
-from bridges.transports.dds.ends import DdsSubscription
+from bridges.transports.dds.ends import DdsSubscription, _writer_qos
+from bridges.transports.dds.idl import sample_type
 from bridges.transports.dds.peers import BuiltinReader
 from bridges.transports.dds.transport import DdsTransport
 from bridges.transports.peers import Announced
@@ -83,6 +90,33 @@ def test_an_announcement_that_cannot_be_read_is_skipped_and_those_beside_it_are_
     assert [code for code, _ in here.faults()] == ["TYPE_MISFIT"]
     assert (here.lives, here.dropped) == (True, {"DCPSPublication": len(writers)})
     assert not [text for text in caplog.messages if "reader_failed" in text]
+
+
+def test_a_node_whose_name_cannot_be_read_costs_no_message_and_no_other_nodes_name(
+    join_dds: Join, observer: Any
+) -> None:
+    """The foreign participant also publishes an alarm, through a writer whose QoS cannot be read."""
+    nodes = DdsTopic(observer, discovery.NODES, discovery.ParticipantEntitiesInfo)
+    names = DataWriter(observer, nodes, qos=discovery._qos())
+    foreign = discovery.NodeEntitiesInfo("/", Unreadable("name"), [], [])
+    names.write(discovery.ParticipantEntitiesInfo(discovery.Gid([1] * 16), [foreign]))
+    here, heard = join_dds("here"), list[tuple[bool, str | None]]()
+
+    def hear(alarm: d.Bool) -> None:
+        sender = here.sender()
+        heard.append((alarm.data, sender.node if sender else None))
+
+    subscription = here.subscribe(FIRE_ALARM_TRIGGER, hear)
+    join_dds("there").publisher(FIRE_ALARM_TRIGGER)
+    wait_until(lambda: subscription.senders() == ["/there"], "the readable name is known")
+    publisher = DdsPublisher(observer, Qos(Policy.Partition(["", Unreadable("lab")])))
+    alarms = DdsTopic(observer, "rt/fire_alarm_trigger", sample_type(d.Bool))
+    alarm = DataWriter(publisher, alarms, qos=_writer_qos(FIRE_ALARM_TRIGGER.publish, ""))
+    wait_until(lambda: subscription.matched() == 2, "the foreign writer matches")
+    alarm.write(sample_type(d.Bool)(d.Bool(True)))
+    wait_until(lambda: heard, "the alarm is heard")
+    assert heard == [(True, "")]
+    assert subscription.senders() == ["/there"]
 
 
 def test_a_peer_with_another_type_is_named_once(

@@ -5,6 +5,7 @@ remains, but its DDS writer or reader is replaced by a new one.
 """
 
 import threading
+import uuid
 from collections import deque
 from collections.abc import Callable, Hashable
 from typing import Final, Protocol
@@ -169,12 +170,20 @@ class DdsSubscription:
 
     def _nodes(self, handles: list[int]) -> list[str]:
         """Return the nodes of these matched publishers. Leave out unknown nodes."""
-        reader = self._reader
+        found = [writer.key.bytes for writer in map(self._writer, handles) if writer]
         try:
-            found = [reader.get_matched_publication_data(handle) for handle in handles if reader]
+            return self._owners(found)
         except DDSException:
             return []
-        return self._owners([writer.key.bytes for writer in found if writer])
+
+    def _writer(self, handle: int) -> "_Writer | None":
+        """Return the announcement of a matched publisher. Return None if it has gone, or if its
+        announcement cannot be read."""
+        try:
+            reader = self._reader
+            return reader.get_matched_publication_data(handle) if reader else None
+        except Exception:  # noqa: BLE001 - a plain Exception, for example if a QoS is not UTF-8
+            return None
 
     def _node_of(self, handle: Hashable) -> str:
         return next(iter(self._nodes([handle])), "")  # type: ignore[list-item]
@@ -205,6 +214,12 @@ class DdsSubscription:
         status = self._reader.get_requested_incompatible_qos_status()
         if status.total_count_change:
             _log_misfit(self.topic, notices.NOT_HEARD, status, peers)
+
+
+class _Writer(Protocol):
+    """DDS's announcement of a publisher. `key`: its guid"""
+
+    key: uuid.UUID
 
 
 class _Misfits(Protocol):

@@ -151,7 +151,7 @@ class DdsTransport(Threaded):
         self._waitset.attach(self._leaving)
         for reader in self._dds_peers.join(self._participant):
             self._waitset.attach(self._keep(core.ReadCondition(self._keep(reader), ANY_SAMPLE)))
-        self._node = NodeOnGraph(self._participant, self.name)
+        self._node = NodeOnGraph(self._participant, self.name, self.dropped)
         self._entities += [self._node.topic, self._node.writer]
         self._joined = True
 
