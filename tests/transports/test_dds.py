@@ -119,6 +119,27 @@ def test_a_node_whose_name_cannot_be_read_costs_no_message_and_no_other_nodes_na
     assert subscription.senders() == ["/there"]
 
 
+def test_a_node_keeps_its_name_however_many_have_left_the_graph_since(
+    join_dds: Join, observer: Any
+) -> None:
+    """The foreign participant announces the nodes of 11 participants, which have left the graph."""
+    subscription = join_dds("here").subscribe(FIRE_ALARM_TRIGGER, print)
+    join_dds("there").publisher(FIRE_ALARM_TRIGGER)
+    wait_until(lambda: subscription.senders() == ["/there"], "the first node has a name")
+    nodes = DdsTopic(observer, discovery.NODES, discovery.ParticipantEntitiesInfo)
+    announces = DataWriter(observer, nodes, qos=discovery._qos(100))
+    alarms = DdsTopic(observer, "rt/fire_alarm_trigger", sample_type(d.Bool))
+    last = DataWriter(observer, alarms, qos=_writer_qos(FIRE_ALARM_TRIGGER.publish, ""))
+    some = random.Random(1)
+    left = [[list(some.randbytes(16)) for _ in range(500)] for _ in range(11)]
+    for guids in [*left, [list(last.guid.bytes)]]:
+        owned = discovery.NodeEntitiesInfo("/", "last", [], list(map(discovery.Gid, guids)))
+        announces.write(discovery.ParticipantEntitiesInfo(discovery.Gid(guids[0]), [owned]))
+        subscription.senders()
+    wait_until(lambda: "/last" in subscription.senders(), "the last node has a name")
+    assert sorted(subscription.senders()) == ["/last", "/there"]
+
+
 def test_a_peer_with_another_type_is_named_once(
     join_dds: Join, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -3,6 +3,7 @@ announcement has the topic, the type, and the type hash in its user data."""
 
 import re
 import threading
+import uuid
 from collections.abc import Hashable
 from typing import Any, Final, Protocol
 
@@ -78,6 +79,11 @@ class DdsPeers:
             while self._take_one(reader, bool(publishes)):
                 news = True
         return news
+
+    def present(self) -> set[bytes]:
+        """Return the guids of the ends of ROS's topics that are on the graph now. Any thread may call
+        this method."""
+        return {key.bytes for key in self._peers.present() if isinstance(key, uuid.UUID)}
 
     def _take_one(self, reader: BuiltinReader, publishes: bool) -> bool:
         """Take one announcement. If several were taken at once, one that cannot be read would cost all

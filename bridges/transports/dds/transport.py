@@ -257,7 +257,7 @@ class DdsTransport(Threaded):
                 return []
             if self._node.reader is None:
                 self._keep(self._node.listen())
-            return self._node.owners(writers)
+            return self._node.owners(writers, self._dds_peers.present)
 
     def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
         """Take one writer off the graph. Do nothing after `close`, which removes all writers."""
