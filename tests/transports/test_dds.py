@@ -255,6 +255,40 @@ def test_a_domain_that_is_open_on_the_network_is_not_taken_for_loopback(
         exposed.close()
 
 
+def test_a_publisher_that_is_withdrawn_while_the_reader_looks_for_misfits_harms_nobody(
+    join_dds: Join, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    received: list[d.LiftState] = []
+    node = join_dds("here")
+    node.subscribe(LIFT_STATES, received.append)
+    asks, withdrawn = DataWriter.get_offered_incompatible_qos_status, list[bool]()
+
+    def look(writer: DataWriter) -> Any:
+        if threading.current_thread().name == "here-dds" and not withdrawn:
+            withdrawn.append(True)
+            closing = threading.Thread(target=publisher.close)
+            closing.start()
+            closing.join()
+        return asks(writer)
+
+    publisher = node.publisher(LIFT_REQUESTS)
+    monkeypatch.setattr(DataWriter, "get_offered_incompatible_qos_status", look)
+    voice = join_dds("there").publisher(LIFT_STATES)
+    wait_until(lambda: withdrawn, "the reader looks, because another node has come")
+    after = d.LiftState(lift_name="after")
+    wait_until(lambda: after in received or peer.sent(voice, after), "the node still hears")
+    assert caplog.messages == []
+
+
+def test_a_publisher_of_a_message_that_rmfs_release_lacks_can_be_closed(domain: int) -> None:
+    node = DdsTransport("here", domain, loopback=True, release=DEFAULT)
+    publisher = node.publisher(Topic("alert", d.Alert))
+    assert not node.release.has(d.Alert)
+    publisher.close()
+    assert publisher.matched() == 0
+    node.close()
+
+
 def test_a_reader_that_fails_joins_again_and_hears_again(
     join_dds: Join, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

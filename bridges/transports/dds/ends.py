@@ -39,14 +39,14 @@ POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation"
 
 
 class DdsPublisher:
-    """The publisher of one topic. `withdraw(publisher, writer)` removes the writer from the ROS
+    """The publisher of one topic. `withdraw(publisher)` removes the publisher's writer from the ROS
     graph."""
 
     def __init__(
         self,
         topic: AnyTopic,
         reader_thread: threading.Thread,
-        withdraw: Callable[["DdsPublisher", DataWriter], None],
+        withdraw: Callable[["DdsPublisher"], None],
     ) -> None:
         self.topic = topic
         self._withdraw = withdraw
@@ -66,9 +66,11 @@ class DdsPublisher:
         self._writer = DataWriter(participant, topic, qos=qos)
         return self._writer
 
-    def drop(self) -> None:
-        """Forget the writer, because its participant has been deleted."""
-        self._writer = None
+    def drop(self) -> DataWriter:
+        """Forget the writer. Return it, or None without one. The caller deletes it, or has deleted its
+        participant."""
+        writer, self._writer = self._writer, None
+        return writer
 
     def send_retained(self) -> None:
         """Send the retained messages again, for late joiners."""
@@ -91,14 +93,15 @@ class DdsPublisher:
 
     def matched(self) -> int:
         """Return the number of matched subscriptions. Return 0 after `close`."""
+        writer = self._writer
         try:
-            return len(self._writer.get_matched_subscriptions()) if self._writer else 0
+            return len(writer.get_matched_subscriptions()) if writer else 0
         except DDSException:
             return 0
 
     def close(self) -> None:
         """Remove this publisher from the ROS graph."""
-        self._withdraw(self, self._writer)
+        self._withdraw(self)
 
     def _write(self, message: Message) -> None:
         assert self._sample is not None
@@ -106,9 +109,13 @@ class DdsPublisher:
 
     def log_misfits(self, peers: Peers) -> None:
         """Log each new subscription of this topic whose QoS does not match ours."""
-        if self._writer is None:
+        writer = self._writer
+        if writer is None:
             return
-        status = self._writer.get_offered_incompatible_qos_status()
+        try:
+            status = writer.get_offered_incompatible_qos_status()
+        except DDSException:  # another thread has withdrawn this publisher
+            return
         if status.total_count_change:
             _log_misfit(self.topic, notices.NOT_SERVED, status, peers)
 
@@ -153,8 +160,9 @@ class DdsSubscription:
 
     def matched(self) -> int:
         """Return the number of matched publishers. Return 0 after `close`."""
+        reader = self._reader
         try:
-            return len(self._reader.get_matched_publications()) if self._reader else 0
+            return len(reader.get_matched_publications()) if reader else 0
         except DDSException:
             return 0
 

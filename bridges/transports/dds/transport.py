@@ -24,7 +24,6 @@ from cyclonedds import core
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.internal import DDS, dds_infinity
-from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
@@ -259,13 +258,14 @@ class DdsTransport(Threaded):
                 self._keep(self._node.listen())
             return self._node.owners(writers, self._dds_peers.present)
 
-    def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
+    def _withdraw(self, publisher: DdsPublisher) -> None:
         """Take one writer off the graph. Do nothing after `close`, which removes all writers."""
         with self._lock:
             if self._closed or publisher not in self._ends:
                 return
             self._ends = tuple(end for end in self._ends if end is not publisher)
-            if not self._joined:
+            writer = publisher.drop()
+            if not self._joined or writer is None:
                 return
             self._waitset.detach(writer)
             self._node.drop_writer(writer)
