@@ -6,6 +6,7 @@ no thread and no file may remain.
 
 import os
 import threading
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -60,3 +61,36 @@ def test_a_peer_whose_durability_does_not_fit_is_named_once(
 
 def _threads_and_files() -> tuple[int, int]:
     return len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd"))
+
+
+WRITES = {"dds": "_write", "ros2": "_write", "zenoh": "_put"}
+"""The method of a publisher that gives a message to the library."""
+
+
+def test_a_message_that_is_published_while_the_node_joins_again_stays_the_last_one_retained(
+    join_any_wire: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node: Any = join_any_wire("node")
+    alarm = node.publisher(FIRE_ALARM_TRIGGER)
+    alarm.publish(d.Bool(False))
+    meanwhile = threading.Thread(target=alarm.publish, args=(d.Bool(True),))
+    kind, name = type(alarm), WRITES[node.speaks]
+    writes = getattr(kind, name)
+
+    def write(publisher: Any, *arguments: object) -> None:
+        if threading.current_thread() is node._thread and not meanwhile.ident:
+            meanwhile.start()
+            meanwhile.join(0.2)  # it has ended by then if nothing holds it back
+        writes(publisher, *arguments)
+
+    monkeypatch.setattr(kind, name, write)
+    if node.speaks == "zenoh":
+        node._orders.put(node._join_anew)
+    else:
+        node._set_back = True
+        node._wake()
+    wait_until(lambda: meanwhile.ident and not meanwhile.is_alive(), "the message is published")
+    heard: list[d.Bool] = []
+    join_any_wire("late").subscribe(FIRE_ALARM_TRIGGER, heard.append)
+    wait_until(lambda: len(heard) == 2, "a node that comes late hears what is retained")
+    assert heard == [d.Bool(False), d.Bool(True)]

@@ -50,6 +50,7 @@ class DdsPublisher:
     ) -> None:
         self.topic = topic
         self._withdraw = withdraw
+        self._using = threading.Lock()
         self._writer: DataWriter = None
         self._reader_thread = reader_thread
         self._retained: deque[Message] = deque(maxlen=topic.repeats)
@@ -60,36 +61,39 @@ class DdsPublisher:
     def create(
         self, participant: DomainParticipant, topic: DdsTopic, release: Release
     ) -> DataWriter:
-        """Make the publisher's writer, which replaces an earlier writer. Return the writer."""
+        """Make a writer, and return it. `begin` lets the publisher use it."""
         qos = _writer_qos(self.topic.publish, type_hash(self.topic.type, release))
-        self._sample = sample_type(self.topic.type, release)
-        self._writer = DataWriter(participant, topic, qos=qos)
-        return self._writer
+        return DataWriter(participant, topic, qos=qos)
+
+    def begin(self, writer: DataWriter, release: Release) -> None:
+        """Publish with this writer from now on. First send the retained messages that still hold again,
+        for late joiners."""
+        with self._using:
+            self._writer, self._sample = writer, sample_type(self.topic.type, release)
+            for message in self._retained:
+                self._write(message)
 
     def drop(self) -> DataWriter:
         """Forget the writer. Return it, or None without one. The caller deletes it, or has deleted its
         participant."""
-        writer, self._writer = self._writer, None
+        with self._using:
+            writer, self._writer = self._writer, None
         return writer
-
-    def send_retained(self) -> None:
-        """Send the retained messages again, for late joiners."""
-        for message in list(self._retained):
-            self._write(message)
 
     def publish(self, message: Message) -> None:
         """Send a message. Block for at most 20 ms. Raises TransportError if the message was not
         sent."""
         if not self._reader_thread.is_alive():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        self._retained.append(message)  # sent again when the node joins again
-        if self._writer is None:
-            why = "there is no network, or RMF's release lacks the message"
-            raise TransportError(f"topic {self.topic.name}: not sent: {why}")
-        try:
-            self._write(message)
-        except DDSException as error:
-            raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+        with self._using:  # so that `begin` sends no older message after this one
+            self._retained.append(message)  # sent again when the node joins again
+            if self._writer is None:
+                why = "there is no network, or RMF's release lacks the message"
+                raise TransportError(f"topic {self.topic.name}: not sent: {why}")
+            try:
+                self._write(message)
+            except DDSException as error:
+                raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
         """Return the number of matched subscriptions. Return 0 after `close`."""

@@ -196,7 +196,7 @@ class DdsTransport(Threaded):
         self._waitset.attach(entity)
         if isinstance(end, DdsPublisher):
             self._node.add_writer(entity)
-            end.send_retained()
+            end.begin(entity, self.release)
         else:
             self._waitset.attach(self._keep(core.ReadCondition(entity, ANY_SAMPLE)))
             self._node.add_reader(entity)

@@ -87,7 +87,8 @@ class Ros2Publisher:
         self._retained: deque[Message] = deque(maxlen=topic.repeats)
 
     def create(self, node: Node) -> None:
-        """Make rclpy's publisher. Send the retained messages again, for late joiners."""
+        """Make rclpy's publisher. Send the retained messages that still hold again, for late joiners.
+        Raises TransportError, and RuntimeError of rclpy."""
         made = node.create_publisher(
             ros_type(self.topic.type, self._ends.release),
             self.topic.name,
@@ -98,8 +99,8 @@ class Ros2Publisher:
         )
         with self._using:
             self._end = made
-        for message in list(self._retained):
-            self._write(message)
+            for message in self._retained:
+                self._write(message)
 
     def drop(self) -> None:
         """Forget rclpy's publisher. Its node has already been removed."""
@@ -118,8 +119,9 @@ class Ros2Publisher:
         be encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        self._retained.append(message)
-        self._write(message)
+        with self._using:  # so that `create` sends no older message after this one
+            self._retained.append(message)
+            self._write(message)
 
     def matched(self) -> int:
         """Return the number of subscriptions that receive this publisher's messages. Do not count this
@@ -136,16 +138,16 @@ class Ros2Publisher:
         self._withdraw(self)
 
     def _write(self, message: Message) -> None:
+        """Send a message. The caller holds the lock `_using`."""
         sample = cdr.encode(self.topic.type, message, self._ends.release)
-        with self._using:
-            if self._end is None:
-                raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
-            for subscription in self._ends.heard_back(self.topic):
-                subscription.said.append(cdr.decode(self.topic.type, sample, self._ends.release))
-            try:
-                self._end.publish(sample)
-            except RuntimeError as error:
-                raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+        if self._end is None:
+            raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
+        for subscription in self._ends.heard_back(self.topic):
+            subscription.said.append(cdr.decode(self.topic.type, sample, self._ends.release))
+        try:
+            self._end.publish(sample)
+        except RuntimeError as error:
+            raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
 
 class Ros2Subscription:
