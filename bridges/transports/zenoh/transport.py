@@ -178,6 +178,7 @@ class ZenohTransport(Threaded):
         )
         self._session = session
         self._appear(session)
+        self._why_unlinked = ""
         trim_memory()
 
     def _appear(self, session: zenoh.Session) -> None:
