@@ -17,10 +17,10 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
 
-from bridges.messages import topics
+from bridges.messages import cdr, topics
 from bridges.messages.cdr import CdrError
 from bridges.messages.definitions import Message
-from bridges.messages.releases import Release
+from bridges.messages.releases import NEWEST, Release
 from bridges.messages.rihs01 import type_hash
 from bridges.messages.topics import AnyTopic
 from bridges.transports import notices
@@ -55,6 +55,7 @@ class DdsPublisher:
         self._reader_thread = reader_thread
         self._retained: deque[Message] = deque(maxlen=topic.repeats)
         self._sample: type[IdlSample] | None = None
+        self._release = NEWEST
 
     watched = DDSStatus.OfferedIncompatibleQos
 
@@ -69,7 +70,8 @@ class DdsPublisher:
         """Publish with this writer from now on. First send the retained messages that still hold again,
         for late joiners."""
         with self._using:
-            self._writer, self._sample = writer, sample_type(self.topic.type, release)
+            self._writer, self._release = writer, release
+            self._sample = sample_type(self.topic.type, release)
             for message in self._retained:
                 self._write(message)
 
@@ -81,12 +83,14 @@ class DdsPublisher:
         return writer
 
     def publish(self, message: Message) -> None:
-        """Send a message. Block for at most 20 ms. Raises TransportError if the message was not
-        sent."""
+        """Send a message. Block for at most 20 ms. Raises TransportError if the message was not sent,
+        and CdrError if it cannot be encoded."""
         if not self._reader_thread.is_alive():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         with self._using:  # so that `begin` sends no older message after this one
-            self._retained.append(message)  # sent again when the node joins again
+            if self._retained.maxlen:  # otherwise cyclonedds alone encodes it
+                cdr.encode(self.topic.type, message, self._release)  # `begin` must not fail
+                self._retained.append(message)
             if self._writer is None:
                 why = "there is no network, or RMF's release lacks the message"
                 raise TransportError(f"topic {self.topic.name}: not sent: {why}")

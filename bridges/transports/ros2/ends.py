@@ -84,7 +84,7 @@ class Ros2Publisher:
         self._withdraw = withdraw
         self._using = threading.Lock()
         self._end: RosPublisher | None = None
-        self._retained: deque[Message] = deque(maxlen=topic.repeats)
+        self._retained: deque[bytes] = deque(maxlen=topic.repeats)
 
     def create(self, node: Node) -> None:
         """Make rclpy's publisher. Send the retained messages that still hold again, for late joiners.
@@ -99,8 +99,8 @@ class Ros2Publisher:
         )
         with self._using:
             self._end = made
-            for message in self._retained:
-                self._write(message)
+            for sample in self._retained:
+                self._write(sample)
 
     def drop(self) -> None:
         """Forget rclpy's publisher. Its node has already been removed."""
@@ -119,9 +119,10 @@ class Ros2Publisher:
         be encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
+        sample = cdr.encode(self.topic.type, message, self._ends.release)
         with self._using:  # so that `create` sends no older message after this one
-            self._retained.append(message)
-            self._write(message)
+            self._retained.append(sample)
+            self._write(sample)
 
     def matched(self) -> int:
         """Return the number of subscriptions that receive this publisher's messages. Do not count this
@@ -137,9 +138,8 @@ class Ros2Publisher:
         """Remove this publisher from the ROS graph."""
         self._withdraw(self)
 
-    def _write(self, message: Message) -> None:
-        """Send a message. The caller holds the lock `_using`."""
-        sample = cdr.encode(self.topic.type, message, self._ends.release)
+    def _write(self, sample: bytes) -> None:
+        """Send a message's bytes. The caller holds the lock `_using`. Raises TransportError."""
         if self._end is None:
             raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
         for subscription in self._ends.heard_back(self.topic):
