@@ -27,13 +27,29 @@ RETAINED = Qos("transient_local", 100)
 
 
 class Topic(Struct, Generic[M_co], frozen=True):
-    """A topic under its ROS name (without `rt/`). `publish`: the QoS of our publisher. `subscribe`: the
-    QoS of our subscription."""
+    """A topic under its ROS name (without `rt/`).
+
+    - `publish`: the QoS of our publisher
+    - `subscribe`: the QoS of our subscription
+    - `lasting`: Does a retained message still hold when its publisher leaves the graph and joins again?
+      A state such as an alarm does. A request does not.
+    """
 
     name: str
     type: type[M_co]
     publish: Qos = VOLATILE
     subscribe: Qos = VOLATILE
+    lasting: bool = True
+
+    @property
+    def repeats(self) -> int:
+        """The number of its last messages that our publisher sends again after it has joined again.
+
+        Volatile subscriptions hear them too. So no request is among them: a lift would obey the request
+        of a ride that has ended.
+        """
+        retains = self.publish.durability == "transient_local"
+        return self.publish.depth if retains and self.lasting else 0
 
     def named(self, name: str) -> "Topic[M_co]":
         """Return the same topic under another name."""
@@ -50,9 +66,11 @@ AnyTopic = Topic[d.Message]
 
 LIFT_STATES = Topic("lift_states", d.LiftState)
 # The subscription is VOLATILE. With TRANSIENT_LOCAL our restart would replay up to 100 old requests.
-LIFT_REQUESTS = Topic("lift_requests", d.LiftRequest, publish=RETAINED, subscribe=VOLATILE)
+LIFT_REQUESTS = Topic(
+    "lift_requests", d.LiftRequest, publish=RETAINED, subscribe=VOLATILE, lasting=False
+)
 ADAPTER_LIFT_REQUESTS = Topic(
-    "adapter_lift_requests", d.LiftRequest, publish=RETAINED, subscribe=RETAINED
+    "adapter_lift_requests", d.LiftRequest, publish=RETAINED, subscribe=RETAINED, lasting=False
 )
 DOOR_STATES = Topic("door_states", d.DoorState)
 DOOR_REQUESTS = Topic("door_requests", d.DoorRequest)

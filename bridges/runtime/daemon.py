@@ -20,6 +20,7 @@ import msgspec
 from bridges import VERSION
 from bridges.blackbox.entries import Head
 from bridges.blackbox.ring import Ring
+from bridges.messages.cdr import CdrError
 from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
@@ -297,6 +298,7 @@ class Daemon:
                 self._writer.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError,
+            CdrError,
             ClockError,
         ) as error:  # debug is enough, because `outlet.py` logs unpublished states as errors
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

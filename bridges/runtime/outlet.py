@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Iterable
 
 from bridges.kinds.shared.decision import Fault
+from bridges.messages.cdr import CdrError
 from bridges.messages.definitions import Alert, Message
 from bridges.messages.fallbacks import INSTEAD, converted
 from bridges.messages.heard import Sender
@@ -45,8 +46,8 @@ class Outlet:
                 self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> bool:
-        """Publish a message. Return False if the message was not sent. Then the node has a fault until
-        a later message of the topic is sent."""
+        """Publish a message. Return False if the message was not sent, or cannot be encoded. Then the
+        node has a fault until a later message of the topic is sent."""
         way, wanted = self._way(topic, message)
         if wanted is None:
             if isinstance(message, Alert):
@@ -54,7 +55,7 @@ class Outlet:
             return True
         try:
             self._end(way).publish(wanted)
-        except TransportError as error:
+        except (TransportError, CdrError) as error:
             self.failed(topic, error)
             return False
         self._once.works(topic.name)

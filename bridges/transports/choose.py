@@ -47,7 +47,7 @@ def open_transport(
     """
     domain = domain_id(rmf, os.environ)
     speaks, reason = _choice(rmf)
-    peers = [] if speaks == "zenoh" else static_peers(os.environ)
+    peers = peers_of(speaks, os.environ)
     loopback = localhost or stays_on_loopback(rmf, os.environ, peers)
     network = "localhost" if loopback else "subnet"
     release = RELEASES.get(rmf.release)
@@ -78,7 +78,13 @@ def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
     return int(text)
 
 
-def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str] = ()) -> bool:
+def peers_of(speaks: str, environ: Mapping[str, str]) -> list[str]:
+    """Return the hosts in ROS_STATIC_PEERS, which a node with this transport looks for. A node on zenoh
+    looks for none of them."""
+    return [] if speaks == "zenoh" else static_peers(environ)
+
+
+def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str]) -> bool:
     """Return whether the node must stay on loopback. The YAML, ROS_LOCALHOST_ONLY or
     ROS_AUTOMATIC_DISCOVERY_RANGE may demand this.
 

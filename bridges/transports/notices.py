@@ -2,6 +2,8 @@
 logged once for each topic."""
 
 import logging
+import math
+from typing import Final
 
 from bridges.messages.cdr import CdrError
 from bridges.messages.definitions import Message
@@ -11,11 +13,34 @@ from bridges.transports.transport import Receive
 
 log = logging.getLogger(__name__)
 
-FAILURES = 5
+FAILURES: Final = 5
 """The number of successive failed reads after which a transport ends its thread. Then the daemon ends
 too."""
+CALM_S: Final = 10.0
+"""The time (s) without a failed read after which a transport forgets the earlier ones. It is longer
+than the time in which a node joins again and hears of all other nodes. So the same failure after each
+joining is not taken for a new one."""
 NOT_HEARD = "a publisher is not heard"
 NOT_SERVED = "a subscription is not served"
+
+
+class Failures:
+    """The failed reads of a transport's thread, of which each came less than CALM_S after the one
+    before."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._last_at = -math.inf
+
+    def count(self, now: float) -> None:
+        """Count a failed read. `now`: the time (s) on a clock that never steps."""
+        self._count = 1 if now - self._last_at >= CALM_S else self._count + 1
+        self._last_at = now
+
+    @property
+    def too_many(self) -> bool:
+        """Return whether the transport must end its thread."""
+        return self._count >= FAILURES
 
 
 def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
@@ -23,6 +48,15 @@ def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
     dropped[topic.name] = dropped.get(topic.name, 0) + 1
     if dropped[topic.name] == 1:
         log.warning(pairs("sample_dropped", topic=topic.name, reason=error, further="only counted"))
+
+
+def skip(dropped: dict[str, int], name: str, error: Exception) -> None:
+    """Count an announcement of another node that cannot be read. Log the first of each topic. `name`:
+    the name of DDS's or ROS's own topic for announcements."""
+    dropped[name] = dropped.get(name, 0) + 1
+    if dropped[name] == 1:
+        text = pairs("announcement_skipped", topic=name, reason=error, further="only counted")
+        log.warning(text)
 
 
 def hand_on(dropped: dict[str, int], topic: AnyTopic, received: Receive, message: Message) -> None:

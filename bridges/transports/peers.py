@@ -78,6 +78,10 @@ class Peers:
         """Note that an end has left the graph."""
         self._ends.pop(key, None)
 
+    def present(self) -> list[Hashable]:
+        """Return the keys of all present ends. Any thread may call this method."""
+        return list(self._ends)
+
     def clear(self) -> None:
         """Forget all ends, because our node joins the graph again."""
         self._ends.clear()

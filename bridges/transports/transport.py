@@ -37,7 +37,8 @@ class Publisher(Protocol[M_contra]):
     """The sending end of one topic."""
 
     def publish(self, message: M_contra) -> None:
-        """Send a message. Block for at most 20 ms. Raises TransportError without a connection."""
+        """Send a message. Block for at most 20 ms. Raises TransportError without a connection, and
+        CdrError for a message that cannot be encoded."""
 
     def matched(self) -> int:
         """Return the number of subscriptions, in all processes, that receive our messages. Return 0

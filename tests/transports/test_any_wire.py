@@ -6,11 +6,13 @@ no thread and no file may remain.
 
 import os
 import threading
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
 
 from bridges.messages import definitions as d
+from bridges.messages.cdr import CdrError
 from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, VOLATILE
 from tests.transports import peer
 from tests.transports.joining import Join
@@ -60,3 +62,57 @@ def test_a_peer_whose_durability_does_not_fit_is_named_once(
 
 def _threads_and_files() -> tuple[int, int]:
     return len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd"))
+
+
+WRITES = {"dds": "_write", "ros2": "_write", "zenoh": "_put"}
+"""The method of a publisher that gives a message to the library."""
+
+
+def join_again(node: Any) -> None:
+    """Let a node leave the graph and join again, in its own thread."""
+    if node.speaks == "zenoh":
+        node._orders.put(node._join_anew)
+    else:
+        node._set_back = True
+        node._wake()
+
+
+def test_a_message_that_is_published_while_the_node_joins_again_stays_the_last_one_retained(
+    join_any_wire: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node: Any = join_any_wire("node")
+    alarm = node.publisher(FIRE_ALARM_TRIGGER)
+    alarm.publish(d.Bool(False))
+    meanwhile = threading.Thread(target=alarm.publish, args=(d.Bool(True),))
+    kind, name = type(alarm), WRITES[node.speaks]
+    writes = getattr(kind, name)
+
+    def write(publisher: Any, *arguments: object) -> None:
+        if threading.current_thread() is node._thread and not meanwhile.ident:
+            meanwhile.start()
+            meanwhile.join(0.2)  # it has ended by then if nothing holds it back
+        writes(publisher, *arguments)
+
+    monkeypatch.setattr(kind, name, write)
+    join_again(node)
+    wait_until(lambda: meanwhile.ident and not meanwhile.is_alive(), "the message is published")
+    heard: list[d.Bool] = []
+    join_any_wire("late").subscribe(FIRE_ALARM_TRIGGER, heard.append)
+    wait_until(lambda: len(heard) == 2, "a node that comes late hears what is retained")
+    assert heard == [d.Bool(False), d.Bool(True)]
+
+
+def test_a_message_that_cannot_be_put_into_bytes_does_not_keep_the_node_from_joining_again(
+    join_any_wire: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    node, everything = join_any_wire("node"), list[d.Bool]()
+    node.subscribe(FIRE_ALARM_TRIGGER, everything.append)
+    alarm = node.publisher(FIRE_ALARM_TRIGGER)
+    alarm.publish(d.Bool(True))
+    with pytest.raises(CdrError):
+        alarm.publish(d.DoorState())  # type: ignore[arg-type]
+    wait_until(lambda: len(everything) == 1, "the alarm is heard")
+    join_again(node)
+    wait_until(lambda: len(everything) == 2, "the node has joined again and repeats its alarm")
+    assert (everything, node.lives) == ([d.Bool(True)] * 2, True)
+    assert caplog.messages == []

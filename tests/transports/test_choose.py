@@ -60,7 +60,7 @@ def test_the_network_is_the_narrower_of_yaml_and_ros(
     network: str, environ: dict[str, str], expected: bool
 ) -> None:
     rmf = msgspec.convert({"network": network}, Rmf)
-    assert stays_on_loopback(rmf, environ) is expected
+    assert stays_on_loopback(rmf, environ, []) is expected
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_localhost_with_static_peers_reaches_them_as_in_ros(
 @pytest.mark.parametrize("text", ["OFF", "localhost", "WORLD"])
 def test_a_range_in_which_nobody_is_found_is_refused(text: str) -> None:
     with pytest.raises(TransportError, match="use SUBNET or LOCALHOST"):
-        stays_on_loopback(Rmf(), {"ROS_AUTOMATIC_DISCOVERY_RANGE": text})
+        stays_on_loopback(Rmf(), {"ROS_AUTOMATIC_DISCOVERY_RANGE": text}, [])
 
 
 @pytest.fixture

@@ -5,10 +5,13 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import closing
+from itertools import count
 from typing import Any
 
 import pytest
 from cyclonedds import builtin
+from cyclonedds.pub import DataWriter
+from cyclonedds.pub import Publisher as DdsPublisher
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
@@ -16,10 +19,17 @@ from cyclonedds.topic import Topic as DdsTopic
 from bridges.messages import definitions as d
 from bridges.messages.releases import DEFAULT, NEWEST
 from bridges.messages.rihs01 import type_hash, type_name
-from bridges.messages.topics import FLEET_STATES, LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages.topics import (
+    FIRE_ALARM_TRIGGER,
+    FLEET_STATES,
+    LIFT_REQUESTS,
+    LIFT_STATES,
+    Topic,
+)
 from bridges.transports.cyclone import LOOPBACK
 from bridges.transports.dds import discovery
-from bridges.transports.dds.ends import DdsSubscription
+from bridges.transports.dds.ends import DdsSubscription, _writer_qos
+from bridges.transports.dds.idl import sample_type
 from bridges.transports.dds.peers import BuiltinReader
 from bridges.transports.dds.transport import DdsTransport
 from bridges.transports.peers import Announced
@@ -57,6 +67,77 @@ def test_noise_on_our_ports_disturbs_nobody(domain: int, join_dds: Join, echo: N
     publisher.publish(after)
     wait_until(lambda: received[-1] == after, "a message after the noise comes back")
     assert (publisher.matched(), node.dropped) == (1, {})
+
+
+class Unreadable(str):
+    """A text that is not UTF-8 on the wire."""
+
+    def encode(self, *_: object) -> bytes:
+        return b"\xff\xfe"
+
+
+def test_an_announcement_that_cannot_be_read_is_skipped_and_those_beside_it_are_not(
+    join_dds: Join, observer: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    foreign = DdsPublisher(observer, Qos(Policy.Partition([Unreadable("lab")])))
+    writers = [DataWriter(foreign, DdsTopic(observer, "anything", discovery.Gid))]
+    stranger = join_dds("stranger")
+    stranger.subscribe(LIFT_STATES.named("x"), print)
+    stranger.publisher(Topic("door_states", d.LiftState))
+    here = join_dds("here")
+    here.subscribe(Topic("door_states", d.DoorState), print)
+    wait_until(here.faults, "the announcement beside it is read")
+    assert [code for code, _ in here.faults()] == ["TYPE_MISFIT"]
+    assert (here.lives, here.dropped) == (True, {"DCPSPublication": len(writers)})
+    assert not [text for text in caplog.messages if "reader_failed" in text]
+
+
+def test_a_node_whose_name_cannot_be_read_costs_no_message_and_no_other_nodes_name(
+    join_dds: Join, observer: Any
+) -> None:
+    """The foreign participant also publishes an alarm, through a writer whose QoS cannot be read."""
+    nodes = DdsTopic(observer, discovery.NODES, discovery.ParticipantEntitiesInfo)
+    names = DataWriter(observer, nodes, qos=discovery._qos())
+    foreign = discovery.NodeEntitiesInfo("/", Unreadable("name"), [], [])
+    names.write(discovery.ParticipantEntitiesInfo(discovery.Gid([1] * 16), [foreign]))
+    here, heard = join_dds("here"), list[tuple[bool, str | None]]()
+
+    def hear(alarm: d.Bool) -> None:
+        sender = here.sender()
+        heard.append((alarm.data, sender.node if sender else None))
+
+    subscription = here.subscribe(FIRE_ALARM_TRIGGER, hear)
+    join_dds("there").publisher(FIRE_ALARM_TRIGGER)
+    wait_until(lambda: subscription.senders() == ["/there"], "the readable name is known")
+    publisher = DdsPublisher(observer, Qos(Policy.Partition(["", Unreadable("lab")])))
+    alarms = DdsTopic(observer, "rt/fire_alarm_trigger", sample_type(d.Bool))
+    alarm = DataWriter(publisher, alarms, qos=_writer_qos(FIRE_ALARM_TRIGGER.publish, ""))
+    wait_until(lambda: subscription.matched() == 2, "the foreign writer matches")
+    alarm.write(sample_type(d.Bool)(d.Bool(True)))
+    wait_until(lambda: heard, "the alarm is heard")
+    assert heard == [(True, "")]
+    assert subscription.senders() == ["/there"]
+
+
+def test_a_node_keeps_its_name_however_many_have_left_the_graph_since(
+    join_dds: Join, observer: Any
+) -> None:
+    """The foreign participant announces the nodes of 11 participants, which have left the graph."""
+    subscription = join_dds("here").subscribe(FIRE_ALARM_TRIGGER, print)
+    join_dds("there").publisher(FIRE_ALARM_TRIGGER)
+    wait_until(lambda: subscription.senders() == ["/there"], "the first node has a name")
+    nodes = DdsTopic(observer, discovery.NODES, discovery.ParticipantEntitiesInfo)
+    announces = DataWriter(observer, nodes, qos=discovery._qos(100))
+    alarms = DdsTopic(observer, "rt/fire_alarm_trigger", sample_type(d.Bool))
+    last = DataWriter(observer, alarms, qos=_writer_qos(FIRE_ALARM_TRIGGER.publish, ""))
+    some = random.Random(1)
+    left = [[list(some.randbytes(16)) for _ in range(500)] for _ in range(11)]
+    for guids in [*left, [list(last.guid.bytes)]]:
+        owned = discovery.NodeEntitiesInfo("/", "last", [], list(map(discovery.Gid, guids)))
+        announces.write(discovery.ParticipantEntitiesInfo(discovery.Gid(guids[0]), [owned]))
+        subscription.senders()
+    wait_until(lambda: "/last" in subscription.senders(), "the last node has a name")
+    assert sorted(subscription.senders()) == ["/last", "/there"]
 
 
 def test_a_peer_with_another_type_is_named_once(
@@ -174,6 +255,40 @@ def test_a_domain_that_is_open_on_the_network_is_not_taken_for_loopback(
         exposed.close()
 
 
+def test_a_publisher_that_is_withdrawn_while_the_reader_looks_for_misfits_harms_nobody(
+    join_dds: Join, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    received: list[d.LiftState] = []
+    node = join_dds("here")
+    node.subscribe(LIFT_STATES, received.append)
+    asks, withdrawn = DataWriter.get_offered_incompatible_qos_status, list[bool]()
+
+    def look(writer: DataWriter) -> Any:
+        if threading.current_thread().name == "here-dds" and not withdrawn:
+            withdrawn.append(True)
+            closing = threading.Thread(target=publisher.close)
+            closing.start()
+            closing.join()
+        return asks(writer)
+
+    publisher = node.publisher(LIFT_REQUESTS)
+    monkeypatch.setattr(DataWriter, "get_offered_incompatible_qos_status", look)
+    voice = join_dds("there").publisher(LIFT_STATES)
+    wait_until(lambda: withdrawn, "the reader looks, because another node has come")
+    after = d.LiftState(lift_name="after")
+    wait_until(lambda: after in received or peer.sent(voice, after), "the node still hears")
+    assert caplog.messages == []
+
+
+def test_a_publisher_of_a_message_that_rmfs_release_lacks_can_be_closed(domain: int) -> None:
+    node = DdsTransport("here", domain, loopback=True, release=DEFAULT)
+    publisher = node.publisher(Topic("alert", d.Alert))
+    assert not node.release.has(d.Alert)
+    publisher.close()
+    assert publisher.matched() == 0
+    node.close()
+
+
 def test_a_reader_that_fails_joins_again_and_hears_again(
     join_dds: Join, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -211,16 +326,21 @@ def test_a_reader_that_fails_joins_again_and_hears_again(
     ]
 
 
+@pytest.mark.parametrize("each", [1, 2], ids=["at each turn", "after each joining"])
 def test_a_reader_that_keeps_failing_is_reported_as_dead(
-    join_dds: Join, monkeypatch: pytest.MonkeyPatch
+    join_dds: Join, monkeypatch: pytest.MonkeyPatch, each: int
 ) -> None:
     node = join_dds("here")
     assert isinstance(node, DdsTransport)
     node.subscribe(LIFT_STATES, lambda state: None)
     publisher = join_dds("there").publisher(LIFT_STATES)
 
+    whole, turns = node._read_once, count(1)
+
     def fails() -> None:
-        raise MemoryError("none left")
+        if next(turns) % each == 0:
+            raise MemoryError("none left")
+        whole()
 
     monkeypatch.setattr("bridges.transports.dds.transport.LOOK_EVERY_S", 0.01)
     monkeypatch.setattr(node, "_read_once", fails)

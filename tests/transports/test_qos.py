@@ -35,6 +35,15 @@ def test_a_lifts_node_hears_adapters_without_what_they_retain() -> None:
     assert (ours.name, typed(ours.subscribe)) == ("adapter_lift_requests", PLAIN)
 
 
+def test_a_node_that_joins_again_repeats_states_that_still_hold_and_no_request() -> None:
+    assert {name: topic.repeats for name, topic in TOPICS.items() if topic.repeats} == {
+        "charging_assignments": 100,
+        "alert": 100,
+        "fire_alarm_trigger": 100,
+        "emergency_signal": 100,
+    }
+
+
 @pytest.mark.parametrize("name", GOLDEN)
 def test_on_the_memory_transport_a_late_subscriber_hears_what_the_golden_depths_retain(
     name: str,

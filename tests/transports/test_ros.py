@@ -14,7 +14,7 @@ from bridges.messages import definitions as d
 from bridges.messages.releases import JAZZY
 from bridges.messages.rihs01 import type_hash
 from bridges.messages.stamps import stamp
-from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, Topic
+from bridges.messages.topics import FIRE_ALARM_TRIGGER, LIFT_REQUESTS, LIFT_STATES, Topic
 from bridges.transports.choose import missing_of_ros
 from bridges.transports.ros2.types import fields_of
 from bridges.transports.transport import TransportError
@@ -292,3 +292,29 @@ def _plain(value: Any) -> Any:
     if isinstance(value, int | str):
         return value
     return d.Time(value.sec, value.nanosec) if hasattr(value, "sec") else tuple(value)
+
+
+def test_a_node_that_cannot_make_a_publisher_when_it_joins_again_tries_once_more(
+    domain: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    from bridges.transports.ros2.ends import Ros2Publisher
+
+    node: Any = joining("ros2", domain)("node")
+    heard: list[d.Bool] = []
+    node.subscribe(FIRE_ALARM_TRIGGER, heard.append)
+    alarm = node.publisher(FIRE_ALARM_TRIGGER)
+    alarm.publish(d.Bool(True))
+    wait_until(lambda: len(heard) == 1, "the node hears its alarm")
+    create, failures = Ros2Publisher.create, iter([TransportError("refused")])
+
+    def create_at_last(publisher: Ros2Publisher, on: Any) -> None:
+        for failure in failures:
+            raise failure
+        create(publisher, on)
+
+    monkeypatch.setattr(Ros2Publisher, "create", create_at_last)
+    node._set_back = True
+    node._wake()
+    wait_until(lambda: len(heard) == 2, "the node has joined again and repeats its alarm")
+    node.close()
+    assert caplog.messages == ["not_joined node=node reason=refused"]

@@ -1,12 +1,13 @@
 """Steps of the wall clock. After a step backwards, `dds` and `ros2` join the graph again."""
 
 import logging
+import threading
 from contextlib import suppress
 
 import pytest
 
 from bridges.messages import definitions as d
-from bridges.messages.topics import DOOR_STATES, FIRE_ALARM_TRIGGER
+from bridges.messages.topics import DOOR_STATES, FIRE_ALARM_TRIGGER, LIFT_REQUESTS
 from bridges.transports import threaded
 from bridges.transports.threaded import WallClock, ahead_s
 from bridges.transports.transport import TransportError
@@ -82,3 +83,53 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
     assert [text for text in caplog.messages if "clock" in text] == [
         "clock_set_back node=node by_s=315576000.0"
     ]
+
+
+@pytest.mark.parametrize("transport", [pytest.param("dds", marks=pytest.mark.dds), ROS2])
+def test_a_node_that_joins_again_does_not_take_its_own_alarm_for_another_nodes(
+    transport: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ahead = [0.0]
+    monkeypatch.setattr(threaded, "ahead_s", lambda: ahead[-1])
+    node, other = joining(transport, domain)("node"), joining(transport, domain)("other")
+    of_others, everything = list[d.Message](), list[d.Message]()
+    node.subscribe(FIRE_ALARM_TRIGGER, of_others.append, others_only=True)
+    node.subscribe(FIRE_ALARM_TRIGGER, everything.append)
+    ours = node.publisher(FIRE_ALARM_TRIGGER)
+    ours.publish(d.Bool(True))
+    wait_until(lambda: everything == [d.Bool(True)], "the node has heard its own alarm")
+    ahead.append(-10 * YEAR_S)
+    wait_until(lambda: len(everything) == 2, "the node has joined again and heard its own alarm")
+    other.publisher(FIRE_ALARM_TRIGGER).publish(d.Bool(False))
+    wait_until(lambda: d.Bool(False) in of_others, "another node's message is heard")
+    node.close()
+    other.close()
+    assert of_others == [d.Bool(False)]
+
+
+@pytest.mark.parametrize("transport", [pytest.param("dds", marks=pytest.mark.dds), ROS2])
+def test_a_supervisor_that_joins_again_repeats_its_alarm_but_no_request_to_a_lift(
+    transport: str, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ahead = {"supervisor-clock": 0.0}
+    monkeypatch.setattr(
+        threaded, "ahead_s", lambda: ahead.get(threading.current_thread().name, 0.0)
+    )
+    supervisor, lift = joining(transport, domain)("supervisor"), joining(transport, domain)("lift")
+    asked, rang = list[d.LiftRequest](), list[d.Bool]()
+    subscription = lift.subscribe(LIFT_REQUESTS, asked.append)
+    lift.subscribe(FIRE_ALARM_TRIGGER, rang.append)
+    requests = supervisor.publisher(LIFT_REQUESTS)
+    alarm = supervisor.publisher(FIRE_ALARM_TRIGGER)
+    wait_until(lambda: requests.matched() and subscription.matched(), "the lift hears requests")
+    requests.publish(d.LiftRequest(session_id="a ride that ends"))
+    alarm.publish(d.Bool(True))
+    wait_until(lambda: asked and rang, "the lift hears the request and the alarm")
+    ahead["supervisor-clock"] = -10 * YEAR_S
+    wait_until(lambda: len(rang) == 2, "the supervisor has joined again and repeats its alarm")
+    wait_until(lambda: requests.matched() and subscription.matched(), "the lift hears requests")
+    requests.publish(d.LiftRequest(session_id="a new ride"))
+    wait_until(lambda: asked[-1].session_id == "a new ride", "the lift hears the new request")
+    supervisor.close()
+    lift.close()
+    assert [request.session_id for request in asked] == ["a ride that ends", "a new ride"]

@@ -18,6 +18,7 @@ from bridges.transports import addresses
 from bridges.transports.transport import TransportError
 from bridges.transports.zenoh import alone as zenoh_alone
 from bridges.transports.zenoh import config as zenoh_config
+from bridges.transports.zenoh import transport as zenoh_transport
 from bridges.transports.zenoh.transport import ZenohTransport
 from tests.transports import peer
 from tests.transports.zenoh_programs import Router, free_port, meeting
@@ -136,6 +137,22 @@ def test_a_router_that_is_lost_and_comes_back_finds_states_and_what_was_retained
     assert linked(caplog, "lift") == ["linked", "not_linked", "linked"]
 
 
+def test_the_fault_of_a_lost_router_does_not_name_the_reason_of_an_earlier_one(
+    site: Site, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    lift = site.node("lift", endpoint, mode="client")
+    wait_until(lambda: linked(caplog, "lift") == ["not_linked"], "no router answers")
+    ((_, at_first),) = lift.faults()
+    router = site.router(endpoint)
+    wait_until(lambda: linked(caplog, "lift")[1:] == ["linked"], "the router answers")
+    router.die()
+    wait_until(lambda: len(linked(caplog, "lift")) == 3, "the loss is noted")
+    assert at_first != zenoh_transport.NO_ROUTER
+    assert lift.faults() == [("NO_ROUTER", zenoh_transport.NO_ROUTER)]
+
+
 def test_with_two_routers_each_message_comes_once_and_one_of_them_is_enough(site: Site) -> None:
     first = site.router()
     second = site.router(connect__endpoints=[first.endpoint])
@@ -180,11 +197,19 @@ def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_ag
     alarm = lift.publisher(FIRE_ALARM_TRIGGER)
     alarm.publish(d.Bool(True))
     wait_until(lambda: talk.arrives("before"), "RMF hears the lift")
+    requests, asked = lift.publisher(LIFT_REQUESTS), list[str]()
+    rmf.subscribe(LIFT_REQUESTS, lambda request: asked.append(request.session_id))
+    ended = d.LiftRequest(session_id="a ride that ends")
+    wait_until(lambda: asked or peer.sent(requests, ended), "a request is heard")
+    heard = len(asked)
     machine.addresses = frozenset({(2, "10.0.0.8")})
     wait_until(
         lambda: "network addresses=10.0.0.8" in caplog.messages, "the new address is noticed"
     )
     wait_until(lambda: talk.arrives("after"), "RMF hears the lift again")
+    new = d.LiftRequest(session_id="a new ride")
+    wait_until(lambda: new.session_id in asked or peer.sent(requests, new), "a request is heard")
+    assert set(asked[heard:]) == {"a new ride"}
     rang: list[d.Bool] = []
     site.node("late", router.endpoint, mode="client").subscribe(FIRE_ALARM_TRIGGER, rang.append)
     wait_until(lambda: rang, "a node that comes late hears the retained message")

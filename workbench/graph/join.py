@@ -131,10 +131,11 @@ class Renamed:
 def graph_of(args: argparse.Namespace, speaks: str) -> str:
     """Describe the graph (network of ROS nodes) that the command has joined. Example: `dds in domain 7,
     on this machine alone`."""
-    from bridges.transports.choose import domain_id, stays_on_loopback
+    from bridges.transports.choose import domain_id, peers_of, stays_on_loopback
 
     rmf = overridden(_configured(args.config), args)
-    alone = args.localhost or stays_on_loopback(rmf, os.environ)
+    peers = peers_of(speaks, os.environ)
+    alone = args.localhost or stays_on_loopback(rmf, os.environ, peers)
     where = f"{speaks} in domain {domain_id(rmf, os.environ)}"
     return f"{where}, on this machine alone" if alone else where
 

@@ -39,11 +39,20 @@ class TypedTime:
     day: str | None = None
     of_day_s: float = 0.0
 
-    def wall(self, began: float) -> float:
-        """Return the time (s since the epoch). `began` is the recording's beginning (s since the
-        epoch)."""
+    def past_s(self, heard: Heard | Own, first: Heard | Own) -> float:
+        """Return how long (s) after this time a message was heard. The result is negative before this
+        time. `first`: the recording's first message.
+
+        Seconds after the beginning count by a clock that never steps. The wall clock may step, for
+        example when a machine without a battery for its clock gets the time from the network.
+        """
         if self.after_s is not None:
-            return began + self.after_s
+            return heard.at - first.at - self.after_s
+        return heard.wall - self._wall(first.wall)
+
+    def _wall(self, began: float) -> float:
+        """Return the time of day (s since the epoch). `began` is the recording's beginning (s since the
+        epoch)."""
         day = datetime.fromisoformat(self.day) if self.day else datetime.fromtimestamp(began)
         midnight = day.replace(hour=0, minute=0, second=0, microsecond=0)
         return (midnight + timedelta(seconds=self.of_day_s)).timestamp()
@@ -157,14 +166,13 @@ def between(
 
     Damage is printed on standard error. Raises BagError.
     """
-    notes, began, until = Notes(), None, float("inf")
+    notes, first = Notes(), None
     for heard in all_in(path, notes, keep):
-        if began is None:
-            began = heard.wall
-            until = span.to.wall(began) if span.to else until
-        if span.from_ and span.begins_at == float("-inf") and heard.wall >= span.from_.wall(began):
+        first = first or heard
+        has_begun = span.begins_at > float("-inf")
+        if span.from_ and not has_begun and span.from_.past_s(heard, first) >= 0:
             span.begins_at = heard.at
-        if heard.wall > until:
+        if span.to and span.to.past_s(heard, first) > 0:
             break
         yield heard
     if notes.damage:

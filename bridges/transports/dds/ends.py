@@ -5,6 +5,7 @@ remains, but its DDS writer or reader is replaced by a new one.
 """
 
 import threading
+import uuid
 from collections import deque
 from collections.abc import Callable, Hashable
 from typing import Final, Protocol
@@ -16,10 +17,10 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
 
-from bridges.messages import topics
+from bridges.messages import cdr, topics
 from bridges.messages.cdr import CdrError
 from bridges.messages.definitions import Message
-from bridges.messages.releases import Release
+from bridges.messages.releases import NEWEST, Release
 from bridges.messages.rihs01 import type_hash
 from bridges.messages.topics import AnyTopic
 from bridges.transports import notices
@@ -38,67 +39,77 @@ POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation"
 
 
 class DdsPublisher:
-    """The publisher of one topic. `withdraw(publisher, writer)` removes the writer from the ROS
+    """The publisher of one topic. `withdraw(publisher)` removes the publisher's writer from the ROS
     graph."""
 
     def __init__(
         self,
         topic: AnyTopic,
         reader_thread: threading.Thread,
-        withdraw: Callable[["DdsPublisher", DataWriter], None],
+        withdraw: Callable[["DdsPublisher"], None],
     ) -> None:
         self.topic = topic
         self._withdraw = withdraw
+        self._using = threading.Lock()
         self._writer: DataWriter = None
         self._reader_thread = reader_thread
-        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[Message] = deque(maxlen=depth)
+        self._retained: deque[Message] = deque(maxlen=topic.repeats)
         self._sample: type[IdlSample] | None = None
+        self._release = NEWEST
 
     watched = DDSStatus.OfferedIncompatibleQos
 
     def create(
         self, participant: DomainParticipant, topic: DdsTopic, release: Release
     ) -> DataWriter:
-        """Make the publisher's writer, which replaces an earlier writer. Return the writer."""
+        """Make a writer, and return it. `begin` lets the publisher use it."""
         qos = _writer_qos(self.topic.publish, type_hash(self.topic.type, release))
-        self._sample = sample_type(self.topic.type, release)
-        self._writer = DataWriter(participant, topic, qos=qos)
-        return self._writer
+        return DataWriter(participant, topic, qos=qos)
 
-    def drop(self) -> None:
-        """Forget the writer, because its participant has been deleted."""
-        self._writer = None
+    def begin(self, writer: DataWriter, release: Release) -> None:
+        """Publish with this writer from now on. First send the retained messages that still hold again,
+        for late joiners."""
+        with self._using:
+            self._writer, self._release = writer, release
+            self._sample = sample_type(self.topic.type, release)
+            for message in self._retained:
+                self._write(message)
 
-    def send_retained(self) -> None:
-        """Send the retained messages again, for late joiners."""
-        for message in list(self._retained):
-            self._write(message)
+    def drop(self) -> DataWriter:
+        """Forget the writer. Return it, or None without one. The caller deletes it, or has deleted its
+        participant."""
+        with self._using:
+            writer, self._writer = self._writer, None
+        return writer
 
     def publish(self, message: Message) -> None:
-        """Send a message. Block for at most 20 ms. Raises TransportError if the message was not
-        sent."""
+        """Send a message. Block for at most 20 ms. Raises TransportError if the message was not sent,
+        and CdrError if it cannot be encoded."""
         if not self._reader_thread.is_alive():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        self._retained.append(message)  # sent again when the node joins again
-        if self._writer is None:
-            why = "there is no network, or RMF's release lacks the message"
-            raise TransportError(f"topic {self.topic.name}: not sent: {why}")
-        try:
-            self._write(message)
-        except DDSException as error:
-            raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+        with self._using:  # so that `begin` sends no older message after this one
+            if self._retained.maxlen:  # otherwise cyclonedds alone encodes it
+                cdr.encode(self.topic.type, message, self._release)  # `begin` must not fail
+                self._retained.append(message)
+            if self._writer is None:
+                why = "there is no network, or RMF's release lacks the message"
+                raise TransportError(f"topic {self.topic.name}: not sent: {why}")
+            try:
+                self._write(message)
+            except DDSException as error:
+                raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
         """Return the number of matched subscriptions. Return 0 after `close`."""
+        writer = self._writer
         try:
-            return len(self._writer.get_matched_subscriptions()) if self._writer else 0
+            return len(writer.get_matched_subscriptions()) if writer else 0
         except DDSException:
             return 0
 
     def close(self) -> None:
         """Remove this publisher from the ROS graph."""
-        self._withdraw(self, self._writer)
+        self._withdraw(self)
 
     def _write(self, message: Message) -> None:
         assert self._sample is not None
@@ -106,9 +117,13 @@ class DdsPublisher:
 
     def log_misfits(self, peers: Peers) -> None:
         """Log each new subscription of this topic whose QoS does not match ours."""
-        if self._writer is None:
+        writer = self._writer
+        if writer is None:
             return
-        status = self._writer.get_offered_incompatible_qos_status()
+        try:
+            status = writer.get_offered_incompatible_qos_status()
+        except DDSException:  # another thread has withdrawn this publisher
+            return
         if status.total_count_change:
             _log_misfit(self.topic, notices.NOT_SERVED, status, peers)
 
@@ -153,8 +168,9 @@ class DdsSubscription:
 
     def matched(self) -> int:
         """Return the number of matched publishers. Return 0 after `close`."""
+        reader = self._reader
         try:
-            return len(self._reader.get_matched_publications()) if self._reader else 0
+            return len(reader.get_matched_publications()) if reader else 0
         except DDSException:
             return 0
 
@@ -170,12 +186,20 @@ class DdsSubscription:
 
     def _nodes(self, handles: list[int]) -> list[str]:
         """Return the nodes of these matched publishers. Leave out unknown nodes."""
-        reader = self._reader
+        found = [writer.key.bytes for writer in map(self._writer, handles) if writer]
         try:
-            found = [reader.get_matched_publication_data(handle) for handle in handles if reader]
+            return self._owners(found)
         except DDSException:
             return []
-        return self._owners([writer.key.bytes for writer in found if writer])
+
+    def _writer(self, handle: int) -> "_Writer | None":
+        """Return the announcement of a matched publisher. Return None if it has gone, or if its
+        announcement cannot be read."""
+        try:
+            reader = self._reader
+            return reader.get_matched_publication_data(handle) if reader else None
+        except Exception:  # noqa: BLE001 - a plain Exception, for example if a QoS is not UTF-8
+            return None
 
     def _node_of(self, handle: Hashable) -> str:
         return next(iter(self._nodes([handle])), "")  # type: ignore[list-item]
@@ -206,6 +230,12 @@ class DdsSubscription:
         status = self._reader.get_requested_incompatible_qos_status()
         if status.total_count_change:
             _log_misfit(self.topic, notices.NOT_HEARD, status, peers)
+
+
+class _Writer(Protocol):
+    """DDS's announcement of a publisher. `key`: its guid"""
+
+    key: uuid.UUID
 
 
 class _Misfits(Protocol):

@@ -3,17 +3,18 @@ announcement has the topic, the type, and the type hash in its user data."""
 
 import re
 import threading
+import uuid
 from collections.abc import Hashable
 from typing import Any, Final, Protocol
 
 from cyclonedds import builtin
-from cyclonedds.core import InstanceState
+from cyclonedds.core import DDSException, InstanceState
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.qos import Policy, Qos
 
+from bridges.transports import notices
 from bridges.transports.peers import Announced, Peers
 
-AT_ONCE: Final = 100
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 TYPE: Final = re.compile(r"(\w+)::msg::dds_::(\w+)_")
 """The pattern of a message's name in ROS's DDS."""
@@ -52,10 +53,15 @@ class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TI
 
 
 class DdsPeers:
-    """The watcher of the topics on which DDS announces ends. It reports the ends to `peers`."""
+    """The watcher of the topics on which DDS announces ends. It reports the ends to `peers`.
 
-    def __init__(self, peers: Peers) -> None:
+    `skipped`: the number of announcements that cannot be read, by the topic's name. Anybody can
+    announce such an end, for example one whose partition is not UTF-8.
+    """
+
+    def __init__(self, peers: Peers, skipped: dict[str, int]) -> None:
         self._peers = peers
+        self._skipped = skipped
         self._readers: list[tuple[bool, BuiltinReader]] = []
 
     def join(self, participant: DomainParticipant) -> list[BuiltinReader]:
@@ -67,14 +73,32 @@ class DdsPeers:
         return readers
 
     def look(self) -> bool:
-        """Take the new announcements. Return False without new announcements."""
+        """Take the new announcements. Return False without new announcements. Raises DDSException."""
         news = False
         for publishes, reader in self._readers:
-            while samples := reader.take(AT_ONCE):
+            while self._take_one(reader, bool(publishes)):
                 news = True
-                for sample in samples:
-                    self._take(sample, bool(publishes))
         return news
+
+    def present(self) -> set[bytes]:
+        """Return the guids of the ends of ROS's topics that are on the graph now. Any thread may call
+        this method."""
+        return {key.bytes for key in self._peers.present() if isinstance(key, uuid.UUID)}
+
+    def _take_one(self, reader: BuiltinReader, publishes: bool) -> bool:
+        """Take one announcement. If several were taken at once, one that cannot be read would cost all
+        of them. Return False without an announcement, and after one that cannot be read."""
+        try:
+            samples = reader.take(1)
+            for sample in samples:
+                self._take(sample, publishes)
+        except DDSException:
+            raise
+        except Exception as error:  # noqa: BLE001 - cyclonedds raises a plain Exception
+            name = "DCPSPublication" if publishes else "DCPSSubscription"
+            notices.skip(self._skipped, name, error)
+            return False
+        return bool(samples)
 
     def _take(self, sample: _End, publishes: bool) -> None:
         if sample.sample_info.instance_state != InstanceState.Alive:

@@ -15,6 +15,7 @@ import ctypes
 import logging
 import os
 import threading
+import time
 from collections.abc import Callable
 from typing import Final, TypeVar
 from weakref import WeakValueDictionary
@@ -23,7 +24,6 @@ from cyclonedds import core
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.internal import DDS, dds_infinity
-from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
 
@@ -65,8 +65,8 @@ class DdsTransport(Threaded):
     if the node cannot join the domain.
 
     The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
-    again when the machine's addresses change. The caller keeps its publishers and subscriptions, and
-    publishers repeat their retained messages.
+    again when the machine's addresses change. The caller keeps its publishers and subscriptions.
+    Publishers repeat the retained messages that still hold (`Topic.repeats`).
     """
 
     speaks = "dds"
@@ -84,7 +84,7 @@ class DdsTransport(Threaded):
         self._subscriptions: tuple[DdsSubscription, ...] = ()
         self._loopback = loopback
         self._joined = False
-        self._dds_peers = DdsPeers(self._peers)
+        self._dds_peers = DdsPeers(self._peers, self.dropped)
         try:
             with self._reporting(f"{CANNOT_JOIN} {domain_id}"):
                 self._join()
@@ -150,7 +150,7 @@ class DdsTransport(Threaded):
         self._waitset.attach(self._leaving)
         for reader in self._dds_peers.join(self._participant):
             self._waitset.attach(self._keep(core.ReadCondition(self._keep(reader), ANY_SAMPLE)))
-        self._node = NodeOnGraph(self._participant, self.name)
+        self._node = NodeOnGraph(self._participant, self.name, self.dropped)
         self._entities += [self._node.topic, self._node.writer]
         self._joined = True
 
@@ -196,19 +196,18 @@ class DdsTransport(Threaded):
         self._waitset.attach(entity)
         if isinstance(end, DdsPublisher):
             self._node.add_writer(entity)
-            end.send_retained()
+            end.begin(entity, self.release)
         else:
             self._waitset.attach(self._keep(core.ReadCondition(entity, ANY_SAMPLE)))
             self._node.add_reader(entity)
 
     def _read(self) -> None:
-        failures = 0
-        while not self._closed and failures < notices.FAILURES:
+        failures = notices.Failures()
+        while not self._closed and not failures.too_many:
             try:
                 self._read_once()
-                failures = 0
             except Exception as error:  # noqa: BLE001 - logged by _recover
-                failures += 1
+                failures.count(time.monotonic())
                 self._recover(error)
 
     def _read_once(self) -> None:
@@ -257,15 +256,16 @@ class DdsTransport(Threaded):
                 return []
             if self._node.reader is None:
                 self._keep(self._node.listen())
-            return self._node.owners(writers)
+            return self._node.owners(writers, self._dds_peers.present)
 
-    def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
+    def _withdraw(self, publisher: DdsPublisher) -> None:
         """Take one writer off the graph. Do nothing after `close`, which removes all writers."""
         with self._lock:
             if self._closed or publisher not in self._ends:
                 return
             self._ends = tuple(end for end in self._ends if end is not publisher)
-            if not self._joined:
+            writer = publisher.drop()
+            if not self._joined or writer is None:
                 return
             self._waitset.detach(writer)
             self._node.drop_writer(writer)

@@ -50,8 +50,10 @@ class Ends:
         self.subscriptions: tuple[Ros2Subscription, ...] = ()
 
     def __iter__(self) -> "Iterator[Ros2Publisher | Ros2Subscription]":
-        yield from self.publishers
+        """Yield the subscriptions first. When the node joins again, a publisher repeats its retained
+        messages, and each subscription that must ignore them must already know them as our own."""
         yield from self.subscriptions
+        yield from self.publishers
 
     def heard_back(self, topic: AnyTopic) -> "list[Ros2Subscription]":
         """Return this node's subscriptions that must ignore our own messages on the topic, although DDS
@@ -82,11 +84,11 @@ class Ros2Publisher:
         self._withdraw = withdraw
         self._using = threading.Lock()
         self._end: RosPublisher | None = None
-        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[Message] = deque(maxlen=depth)
+        self._retained: deque[bytes] = deque(maxlen=topic.repeats)
 
     def create(self, node: Node) -> None:
-        """Make rclpy's publisher. Send the retained messages again, for late joiners."""
+        """Make rclpy's publisher. Send the retained messages that still hold again, for late joiners.
+        Raises TransportError, and RuntimeError of rclpy."""
         made = node.create_publisher(
             ros_type(self.topic.type, self._ends.release),
             self.topic.name,
@@ -97,8 +99,8 @@ class Ros2Publisher:
         )
         with self._using:
             self._end = made
-        for message in list(self._retained):
-            self._write(message)
+            for sample in self._retained:
+                self._write(sample)
 
     def drop(self) -> None:
         """Forget rclpy's publisher. Its node has already been removed."""
@@ -117,8 +119,10 @@ class Ros2Publisher:
         be encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        self._retained.append(message)
-        self._write(message)
+        sample = cdr.encode(self.topic.type, message, self._ends.release)
+        with self._using:  # so that `create` sends no older message after this one
+            self._retained.append(sample)
+            self._write(sample)
 
     def matched(self) -> int:
         """Return the number of subscriptions that receive this publisher's messages. Do not count this
@@ -134,17 +138,16 @@ class Ros2Publisher:
         """Remove this publisher from the ROS graph."""
         self._withdraw(self)
 
-    def _write(self, message: Message) -> None:
-        sample = cdr.encode(self.topic.type, message, self._ends.release)
-        with self._using:
-            if self._end is None:
-                raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
-            for subscription in self._ends.heard_back(self.topic):
-                subscription.said.append(cdr.decode(self.topic.type, sample, self._ends.release))
-            try:
-                self._end.publish(sample)
-            except RuntimeError as error:
-                raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+    def _write(self, sample: bytes) -> None:
+        """Send a message's bytes. The caller holds the lock `_using`. Raises TransportError."""
+        if self._end is None:
+            raise TransportError(f"topic {self.topic.name}: not sent: there is no network")
+        for subscription in self._ends.heard_back(self.topic):
+            subscription.said.append(cdr.decode(self.topic.type, sample, self._ends.release))
+        try:
+            self._end.publish(sample)
+        except RuntimeError as error:
+            raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
 
 class Ros2Subscription:

@@ -43,7 +43,8 @@ class Ros2Transport(Threaded):
     environment says otherwise. Raises TransportError if the node cannot join the graph.
 
     The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
-    again when the machine's addresses change. Publishers then repeat their retained messages.
+    again when the machine's addresses change. Publishers then repeat the retained messages that still
+    hold (`Topic.repeats`).
     """
 
     speaks = "ros2"
@@ -163,7 +164,7 @@ class Ros2Transport(Threaded):
                 self._join()
                 for end in self._ends:
                     end.create(self.node)
-            except REFUSALS as error:
+            except (*REFUSALS, TransportError) as error:
                 self._leave()
                 if was_joined:
                     log.warning(pairs("not_joined", node=self.name, reason=error))
@@ -188,7 +189,7 @@ class Ros2Transport(Threaded):
     def _spin_once(self) -> None:
         if self._set_back:
             self._join_anew()
-        if not self._loopback and self._look_is_due():
+        if (self._stay is None or not self._loopback) and self._look_is_due():
             self._follow_network()
         if self._stay is None:
             self._stop.wait(LOOK_EVERY_S)
@@ -196,6 +197,7 @@ class Ros2Transport(Threaded):
             self._stay.spin(None if self._loopback else LOOK_EVERY_S)
 
     def _follow_network(self) -> None:
+        """Join again if the machine's addresses have changed, or if the last attempt failed."""
         if self._network_changed() or self._stay is None:
             self._join_anew()
 

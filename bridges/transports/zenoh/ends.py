@@ -13,6 +13,7 @@ remains, and gets a new `Place`, which is its presence in one session. Callbacks
 queue work for the transport's thread.
 """
 
+import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
@@ -123,36 +124,39 @@ class ZenohPublisher(ZenohEnd):
         self._withdraw = withdraw
         self._lives = lives
         self._deaf = deaf
+        self._using = threading.Lock()
         self._sent = 0
-        depth = topic.publish.depth if topic.publish.durability == "transient_local" else 0
-        self._retained: deque[bytes] = deque(maxlen=depth)
+        self._retained: deque[bytes] = deque(maxlen=topic.repeats)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Declare this publisher in a session. Send the retained messages again, for nodes that join
-        late."""
+        """Declare this publisher in a session. Send the retained messages that still hold again, for
+        nodes that join late."""
         place = self._placed(session, keys, "MP", number)
-        self._release = keys.release
-        self._end = end = self._declared(session, place.key)
+        end = self._declared(session, place.key)
         place.appear()
-        self.place, self._sent = place, 0
-        for sample in list(self._retained):
-            self._put(end, place, sample)
+        with self._using:
+            self._release, self._end = keys.release, end
+            self.place, self._sent = place, 0
+            for sample in self._retained:
+                self._put(end, place, sample)
 
     def publish(self, message: Message) -> None:
         """Send a message. Raises TransportError if the message was not sent, and CdrError if it cannot
         be encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        sample = cdr.encode(self.topic.type, message, self._release)
-        self._retained.append(sample)
-        place, end = self.place, self._end  # copies: another thread may clear the attributes
-        if place is None or end is None:
-            raise TransportError(f"topic {self.topic.name}: not sent: the node is not on the graph")
-        try:
-            with contained():
-                self._put(end, place, sample)
-        except zenoh.ZError as error:
-            raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
+        with self._using:  # so that `create` sends no older message after this one
+            sample = cdr.encode(self.topic.type, message, self._release)
+            self._retained.append(sample)
+            place, end = self.place, self._end  # copies: another thread may clear the attributes
+            if place is None or end is None:
+                why = "the node is not on the graph"
+                raise TransportError(f"topic {self.topic.name}: not sent: {why}")
+            try:
+                with contained():
+                    self._put(end, place, sample)
+            except zenoh.ZError as error:
+                raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
         """Return the number of subscriptions that hear this publisher. Return 0 after `close`."""
@@ -168,7 +172,7 @@ class ZenohPublisher(ZenohEnd):
     ) -> zenoh.Publisher | ext.AdvancedPublisher:
         # With DROP, zenoh waits at most 1 ms for room in the queue to a peer.
         congestion, reliable = CongestionControl.DROP, Reliability.RELIABLE
-        if not self._retained.maxlen:
+        if self.topic.publish.durability == "volatile":
             return session.declare_publisher(
                 key, congestion_control=congestion, reliability=reliable
             )
@@ -177,7 +181,7 @@ class ZenohPublisher(ZenohEnd):
             key,
             congestion_control=congestion,
             reliability=reliable,
-            cache=ext.CacheConfig(max_samples=self._retained.maxlen),
+            cache=ext.CacheConfig(max_samples=self.topic.publish.depth),
             sample_miss_detection=ext.MissDetectionConfig(
                 heartbeat=None, sporadic_heartbeat=HEARTBEAT_S
             ),

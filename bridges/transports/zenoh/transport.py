@@ -178,6 +178,7 @@ class ZenohTransport(Threaded):
         )
         self._session = session
         self._appear(session)
+        self._why_unlinked = ""
         trim_memory()
 
     def _appear(self, session: zenoh.Session) -> None:
@@ -277,8 +278,8 @@ class ZenohTransport(Threaded):
     # --- our thread ----------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        failures = 0
-        while not self._closed and failures < notices.FAILURES:
+        failures = notices.Failures()
+        while not self._closed and not failures.too_many:
             try:
                 forever = self._loopback and not self._away
                 order = self._orders.get(timeout=None if forever else LOOK_EVERY_S)
@@ -288,9 +289,8 @@ class ZenohTransport(Threaded):
                 with contained():
                     order()
                     self._follow_network()
-                failures = 0
             except Exception as error:  # noqa: BLE001 - logged by _recover
-                failures += 1
+                failures.count(time.monotonic())
                 self._recover(error)
 
     def _recover(self, error: Exception) -> None:

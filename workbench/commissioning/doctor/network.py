@@ -19,7 +19,7 @@ from bridges.messages.definitions import PACKAGES
 from bridges.runtime.service import named_by
 from bridges.settings.load import Config
 from bridges.transports.addresses import addresses
-from bridges.transports.choose import domain_id, open_transport, stays_on_loopback
+from bridges.transports.choose import domain_id, open_transport, peers_of, stays_on_loopback
 from bridges.transports.transport import Subscription, Transport, TransportError
 from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
 from workbench.graph.live import Ear
@@ -67,7 +67,8 @@ def graph(config: Config, look: GraphLook) -> Iterator[Finding]:
     """Examine the network, RMF's graph, and the versions of RMF's messages."""
     try:
         domain = domain_id(config.rmf, os.environ)
-        loopback = look.localhost or stays_on_loopback(config.rmf, os.environ)
+        peers = peers_of(config.rmf.transport, os.environ)
+        loopback = look.localhost or stays_on_loopback(config.rmf, os.environ, peers)
         yield _interface(domain, loopback)
         with overheard() as said:
             transport = open_transport(
