@@ -13,7 +13,8 @@ secrets out and names them. It also names each service that has no YAML in the b
 The backup has the content behind a link, because the file behind the link may be in no backup.
 
 A memory is restored only if it is at most FRESH_S old. An older memory may say that a robot holds a
-door, although the robot has left. If the daemon restored that hold, it would open the door.
+door, although the robot has left. If the daemon restored that hold, it would open the door. If this
+machine's clock is behind the memory's time, the memory's age is unknown, so it is left out too.
 """
 
 import argparse
@@ -38,6 +39,8 @@ from bridges.system.directories import SERVICE_STATE
 from drivers.profiles import texts
 
 FRESH_S: Final = 3600.0
+AHEAD_S: Final = 60.0
+"""The time (s) by which a memory may be newer than this machine's clock. Two clocks differ by less."""
 MOST_BYTES: Final = 16 << 20
 WANTS: Final = Path("etc/systemd/system/rmf-bridges.target.wants")
 PAGE_USERS: Final = Path("var/lib/rmf-bridge-page/passwords")
@@ -257,11 +260,14 @@ def _configs(
 
 
 def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
-    """Return whether a daemon's memory is at most FRESH_S old. Otherwise print that it is left out."""
-    fresh = time.time() - mtime <= FRESH_S
-    if not fresh:
+    """Return whether a daemon's memory is at most FRESH_S old. Otherwise print that it is left out, and
+    why."""
+    age_s = time.time() - mtime
+    if age_s < -AHEAD_S:
+        print(f"left out, because it is newer than this machine's clock, which may be wrong: /{path}")
+    elif age_s > FRESH_S:
         print(f"left out, because it is older than {FRESH_S / 3600:g} h: /{path}")
-    return fresh
+    return -AHEAD_S <= age_s <= FRESH_S
 
 
 def _write(path: Path, content: bytes, *, private: bool) -> int:

@@ -15,7 +15,7 @@ import pytest
 
 from bridges import cli
 from bridges.commands import backup
-from bridges.commands.backup import FRESH_S, PAGE_USERS
+from bridges.commands.backup import AHEAD_S, FRESH_S, PAGE_USERS
 from bridges.runtime.runtime_directory import KEPT
 from bridges.runtime.services import make_user
 
@@ -118,6 +118,27 @@ def test_an_old_memory_is_not_restored_because_it_would_open_a_door(
     assert restored(new, file) == 0
     assert MEMORY not in content(new)
     assert f"left out, because it is older than 1 h: /{MEMORY}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("ahead_s", "fresh"), [(AHEAD_S - 30, True), (86400.0, False)])
+def test_a_memory_from_the_future_is_not_restored_because_a_wrong_clock_hides_its_age(
+    machine: Path,
+    tmp_path: Path,
+    calls: list[list[str]],
+    capsys: pytest.CaptureFixture[str],
+    ahead_s: float,
+    fresh: bool,
+) -> None:
+    later = time.time() + ahead_s
+    os.utime(machine / MEMORY, (later, later))
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    saved(machine, file)
+    assert restored(new, file) == 0
+    why = "left out, because it is newer than this machine's clock, which may be wrong"
+    assert (MEMORY in content(new), f"{why}: /{MEMORY}" not in capsys.readouterr().out) == (
+        fresh,
+        fresh,
+    )
 
 
 def test_a_backup_with_an_invalid_yaml_changes_nothing(
