@@ -30,6 +30,7 @@ from bridges.runtime.services import (
     CONFIG,
     INSTANCE,
     NO_INSTANCE,
+    NOTIFY,
     SYSTEMD,
     GiveSecret,
     Run,
@@ -50,6 +51,10 @@ from bridges.system.directories import GROUPS, user_of
 
 FLEET: Final = "fleet"
 BESIDE: Final = f"a fleet's YAML: write whole paths, or copy both files of RMF to /{CONFIG}"
+RESERVED: Final = (
+    f"/{CONFIG}/{NOTIFY}.yaml has the recipients of rmf-bridge {NOTIFY}, so no service can have this"
+    " name: rename {}"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,6 +71,10 @@ def run(args: argparse.Namespace) -> int:
     """Return 0 if the service runs, 78 for an invalid file, and 77 if the user is not root."""
     if not INSTANCE.fullmatch(args.file.stem):
         print(NO_INSTANCE.format(args.file.stem), file=sys.stderr)
+        return os.EX_CONFIG
+    # An upgrade still renews the drop-in of a service that an older version has enabled.
+    if args.file.stem == NOTIFY and not args.drop_in:
+        print(RESERVED.format(args.file), file=sys.stderr)
         return os.EX_CONFIG
     try:
         config = load(args.file)

@@ -22,6 +22,9 @@ CONFIG: Final = Path("etc/rmf-bridges")
 SYSTEMD: Final = Path("etc/systemd/system")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 """The pattern of a service's name. It allows only characters that systemd does not escape."""
+NOTIFY: Final = "notify"
+"""The name that no new service may have. `/etc/rmf-bridges/notify.yaml` has the recipients of
+`rmf-bridge-notify.service`."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
     "the outputs of {} are not verified off, and a new drop-in may block access to them: mend the"
@@ -44,12 +47,13 @@ def service_name(text: str) -> str:
 
 
 def services(root: Path = Path("/")) -> set[str]:
-    """Return the names of this machine's services. Each has a YAML in /etc/rmf-bridges, a file of
-    systemd, a record of claimed outputs, or, if the system runs, a systemd unit."""
+    """Return the names of this machine's services. Each has a YAML in /etc/rmf-bridges (other than the
+    recipients of `notify`), a file of systemd, a record of claimed outputs, or, if the system runs, a
+    systemd unit."""
     system = root / SYSTEMD
     links = {*system.glob(f"*.wants/{UNIT}*.service"), *system.glob(f"{UNIT}*.service.d")}
     names = {link.name.removesuffix(".d")[len(UNIT) :].removesuffix(".service") for link in links}
-    names |= {file.stem for file in (root / CONFIG).glob("*.yaml")}
+    names |= {file.stem for file in (root / CONFIG).glob("*.yaml")} - {NOTIFY}
     records = (root / SERVICE_STATE.relative_to("/")).glob(f"*/{PATTERN}")
     names |= {record.parent.name for record in records}
     return names | set(units()) if root == Path("/") else names

@@ -198,8 +198,36 @@ def test_a_file_that_cannot_name_a_service_is_refused(
     assert "is not a service name" in capsys.readouterr().err
 
 
+def test_the_recipients_of_notify_are_no_service_and_no_service_takes_their_place(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipients = tmp_path / "root/etc/rmf-bridges/notify.yaml"
+    recipients.parent.mkdir(parents=True)
+    recipients.write_text("recipients: {}\n")
+    file, root = tmp_path / "notify.yaml", ["--root", str(tmp_path / "root")]
+    file.write_bytes(LIFT.read_bytes())
+    assert main(["enable", str(file), *root]) == os.EX_CONFIG
+    assert capsys.readouterr().err == enable.RESERVED.format(file) + "\n"
+    assert recipients.read_text() == "recipients: {}\n"
+    assert main(["disable", "notify", *root]) == os.EX_USAGE
+    assert capsys.readouterr().err == "no service notify; there is none\n"
+    assert calls == []
+
+
+def test_a_service_named_notify_of_an_earlier_version_can_be_upgraded_and_disabled(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, root = tmp_path / "notify.yaml", ["--root", str(tmp_path)]
+    file.write_bytes(LIFT.read_bytes())
+    assert main(["enable", "--drop-in", str(file), *root]) == 0
+    left = tmp_path / "etc/systemd/system/rmf-bridge@notify.service.d/10-enable.conf"
+    left.parent.mkdir(parents=True)
+    left.write_text(capsys.readouterr().out)
+    assert main(["disable", "notify", *root]) == 0
+
+
 def _told(file: Path, root: Path) -> argparse.Namespace:
-    return argparse.Namespace(file=file, root=root, dry_run=True, no_start=False)
+    return argparse.Namespace(file=file, root=root, dry_run=True, no_start=False, drop_in=False)
 
 
 def test_only_root_changes_a_running_system(
