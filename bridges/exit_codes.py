@@ -29,7 +29,8 @@ SIMULATION: Final = {
 }
 ORDERED: Final = {
     4: "the order was refused (the reason is printed)",
-    69: "the daemon does not answer, or this user may not see it or send it a signal",
+    69: "the order cannot be written, the daemon does not answer, or this user may not see it or send"
+    " it a signal",
 }
 SENT: Final = {
     0: "the effect was seen",

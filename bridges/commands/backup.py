@@ -264,7 +264,9 @@ def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
     why."""
     age_s = time.time() - mtime
     if age_s < -AHEAD_S:
-        print(f"left out, because it is newer than this machine's clock, which may be wrong: /{path}")
+        print(
+            f"left out, because it is newer than this machine's clock, which may be wrong: /{path}"
+        )
     elif age_s > FRESH_S:
         print(f"left out, because it is older than {FRESH_S / 3600:g} h: /{path}")
     return -AHEAD_S <= age_s <= FRESH_S

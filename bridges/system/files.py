@@ -2,21 +2,27 @@
 new file."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 
 def replace(path: Path, content: bytes) -> None:
     """Replace a file, and write the file and its folder to disk. Make the folder if it is missing.
 
-    Raises OSError. In this case the old file is unchanged.
+    Raises OSError. In this case the old file is unchanged, and nothing else is left.
     """
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     new = path.with_name(f".{path.name}.new")
-    with new.open("wb") as out:
-        out.write(content)
-        out.flush()
-        os.fsync(out.fileno())
-    new.replace(path)
+    try:
+        with new.open("wb") as out:
+            out.write(content)
+            out.flush()
+            os.fsync(out.fileno())
+        new.replace(path)
+    except OSError:
+        with suppress(OSError):
+            new.unlink()
+        raise
     _sync(path.parent)
 
 
