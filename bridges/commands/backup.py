@@ -105,19 +105,23 @@ def _save(file: Path, root: Path, *, dry_run: bool) -> int:
 
 
 def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
-    """Write a new archive. Raises OSError, even if only the file exists already, because it may be
-    another backup."""
+    """Write a new archive, or leave none. Raises OSError, even if only the file exists already, because
+    it may be another backup."""
     opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with (
-        open(opened, "wb") as out,
-        tarfile.open(fileobj=out, mode="w:gz", dereference=True) as archive,  # no links
-    ):
-        for path in kept:
-            name = str(path.relative_to(root))
-            if path.parent == root / WANTS:
-                archive.addfile(tarfile.TarInfo(name))
-            else:
-                archive.add(path, name, recursive=False)
+    try:
+        with (
+            open(opened, "wb") as out,
+            tarfile.open(fileobj=out, mode="w:gz", dereference=True) as archive,  # no links
+        ):
+            for path in kept:
+                name = str(path.relative_to(root))
+                if path.parent == root / WANTS:
+                    archive.addfile(tarfile.TarInfo(name))
+                else:
+                    archive.add(path, name, recursive=False)
+    except BaseException:  # Ctrl-C too: half an archive would block the next try
+        file.unlink(missing_ok=True)
+        raise
 
 
 def _is_ours(name: str) -> bool:

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from textwrap import indent
+from typing import Any
 
 import pytest
 
@@ -197,6 +198,31 @@ def test_a_second_backup_does_not_overwrite_the_first_and_a_dry_run_writes_nothi
     file.write_text("another file")
     assert cli.main(line) == os.EX_CANTCREAT
     assert file.read_text() == "another file"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is Linux's")
+def test_a_backup_that_finds_no_room_leaves_no_file_and_the_next_try_succeeds(
+    machine: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file, real = tmp_path / "backup.tar.gz", os.open
+
+    def on_a_full_disk(path: Path, flags: int, mode: int = 0o777, **rest: Any) -> int:
+        opened = real(path, flags, mode, **rest)
+        if path == file:
+            full = real("/dev/full", os.O_WRONLY)
+            os.dup2(full, opened)
+            os.close(full)
+        return opened
+
+    with monkeypatch.context() as disk:
+        disk.setattr(os, "open", on_a_full_disk)
+        assert saved(machine, file) == os.EX_CANTCREAT
+    assert capsys.readouterr().err == f"{file} cannot be written: No space left on device\n"
+    assert not file.exists()
+    assert saved(machine, file) == 0
 
 
 def test_a_machine_without_files_has_nothing_to_save(tmp_path: Path) -> None:
