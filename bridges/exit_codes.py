@@ -17,7 +17,9 @@ ROOT: Final = {
     74: "a file was not written",
     77: "not root",
 }
-SYSTEMS: Final = "a program of systemd failed and said why; other codes of it are possible"
+SYSTEMS: Final = (
+    "a program of systemd is missing, or failed and said why; other codes of it are possible"
+)
 GRAPH: Final = "nothing was heard, or the graph cannot be joined"
 RECORDING: Final = {66: "the recording cannot be read"}
 SIMULATION: Final = {

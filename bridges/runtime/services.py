@@ -26,6 +26,10 @@ NOTIFY: Final = "notify"
 """The name that no new service may have. `/etc/rmf-bridges/notify.yaml` has the recipients of
 `rmf-bridge-notify.service`."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
+NO_SYSTEMD: Final = (
+    "{} is missing, and this command needs systemd. Without systemd, start the daemon with"
+    " rmf-bridge run FILE"
+)
 LEFT_ON: Final = (
     "the outputs of {} are not verified off, and a new drop-in may block access to them: mend the"
     " device and try again. If the device will not answer again, cut its relays' supply, then: rm {}"
@@ -174,7 +178,10 @@ def not_possible(args: argparse.Namespace) -> int:
 
 
 def _did(words: Sequence[str]) -> bool:
-    return subprocess.run(words).returncode == 0
+    try:
+        return subprocess.run(words).returncode == 0
+    except OSError:
+        return False
 
 
 def _show(step: Step) -> None:
@@ -207,7 +214,11 @@ def _taken(step: Step, root: Path) -> int:
     match step:
         case Run(words):
             where = [] if root == Path("/") else [f"--root={root}"]
-            return subprocess.run([words[0], *where, *words[1:]]).returncode
+            try:
+                return subprocess.run([words[0], *where, *words[1:]]).returncode
+            except FileNotFoundError:
+                print(NO_SYSTEMD.format(words[0]), file=sys.stderr)
+                return 1
         case SwitchOff(words, state):
             return _off(words, state)
         case WriteFile(path, content):

@@ -309,6 +309,22 @@ def test_after_a_failed_step_the_stopped_service_starts_again(
     assert "the steps after the failed step were not taken" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("words", [["enable", str(LIFT)], ["disable", "lift_dry_contact"]])
+def test_a_machine_without_systemd_is_told_and_not_changed(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(disable, "services", lambda root: {"lift_dry_contact"})
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(words) == 1
+    *_, why, end = capsys.readouterr().err.splitlines()
+    assert why == services.NO_SYSTEMD.format("systemctl")
+    assert end == "the steps after the failed step were not taken"
+
+
 def with_token(file: Path) -> Path:
     """Write the YAML of a door that needs a token. The door's name is the name of the file."""
     text = (CONFIG / "door_http.yaml").read_text().replace("side_door", file.stem)
