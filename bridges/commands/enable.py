@@ -6,8 +6,9 @@ The command takes these steps:
 2. It stops a running instance, which switches the instance's outputs off. It must do so before step 5,
    because the new drop-in (systemd's file of settings for one instance) may forbid access to the old
    relay.
-3. It copies the file to /etc/rmf-bridges.
-4. It makes a user for the instance, and makes this user the owner of the file's secrets.
+3. It makes a user for the instance, and makes this user the owner of the file's secrets.
+4. It copies the file to /etc/rmf-bridges. Step 5 follows at once, because the new file may not fit
+   the old drop-in.
 5. It writes the instance's drop-in (`bridges/runtime/drop_in.py`).
 6. It starts the instance.
 
@@ -105,11 +106,11 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
     target = root / CONFIG / f"{name}.yaml"
     yield Run(("systemctl", "stop", unit(name)), running_only=True)
     yield switch_off(name)
-    if not target.exists() or not target.samefile(config.path):
-        yield WriteFile(target, config.text, config.path)
     yield make_user(name)
     for secret in _secrets(config, root):
         yield GiveSecret(secret, user)
+    if not target.exists() or not target.samefile(config.path):
+        yield WriteFile(target, config.text, config.path)
     yield WriteFile(root / drop_in_file(name), drop_in.text(config, present, user).encode())
     yield Run(("systemctl", "daemon-reload"), running_only=True)
     yield Run(("systemctl", "enable", "rmf-bridges.target", unit(name)))

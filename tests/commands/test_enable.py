@@ -53,8 +53,8 @@ def test_an_instance_is_stopped_and_off_before_its_file_and_drop_in_change(tmp_p
     assert list(enable.steps(config, tmp_path, ["gpio"])) == [
         Run(("systemctl", "stop", UNIT), running_only=True),
         switch_off("lift_dry_contact"),
-        WriteFile(tmp_path / TARGET, LIFT.read_bytes(), LIFT),
         make_user("lift_dry_contact"),
+        WriteFile(tmp_path / TARGET, LIFT.read_bytes(), LIFT),
         WriteFile(tmp_path / DROP_IN, drop_in.text(config, ["gpio"], USER).encode()),
         Run(("systemctl", "daemon-reload"), running_only=True),
         Run(("systemctl", "enable", "rmf-bridges.target", UNIT)),
@@ -143,8 +143,8 @@ def test_a_dry_run_prints_every_step_and_does_nothing(
         f"{off}   # if a dead daemon left a record in /var/lib/rmf-bridge/lift_dry_contact",
         f"rm /{DROP_IN}",
         "systemctl daemon-reload",
-        f"install -m 644 {LIFT} {tmp_path / TARGET}",
         shlex.join(make_user("lift_dry_contact").words),
+        f"install -m 644 {LIFT} {tmp_path / TARGET}",
         f"write {tmp_path / DROP_IN}:",
     ]
     assert (calls, list(tmp_path.iterdir())) == ([], [])
@@ -307,6 +307,27 @@ def test_after_a_failed_step_the_stopped_service_starts_again(
     assert carry_out([full, Remove(tmp_path / "never")], live, keeps=UNIT) == os.EX_IOERR
     assert calls == [["systemctl", "--quiet", "is-active", UNIT], ["systemctl", "start", UNIT]]
     assert "the steps after the failed step were not taken" in capsys.readouterr().err
+
+
+def test_a_service_whose_user_cannot_be_made_starts_again_with_its_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    called = list[str]()
+
+    def run(words: list[str]) -> "subprocess.CompletedProcess[bytes]":
+        called.append(words[0])
+        return subprocess.CompletedProcess(words, int(words[0] == "systemd-sysusers"))
+
+    monkeypatch.setattr(subprocess, "run", run)
+    installed = tmp_path / TARGET
+    installed.parent.mkdir(parents=True)
+    installed.write_text("old")
+    live = _told(LIFT, Path("/"))
+    live.dry_run = False
+    assert carry_out(enable.steps(load(LIFT), tmp_path, []), live, keeps=UNIT) == 1
+    assert called == ["systemctl", "systemctl", "systemd-sysusers", "systemctl"]
+    assert installed.read_text() == "old"
 
 
 @pytest.mark.parametrize("words", [["enable", str(LIFT)], ["disable", "lift_dry_contact"]])
