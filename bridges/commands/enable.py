@@ -8,7 +8,8 @@ The command takes these steps:
    relay.
 3. It makes a user for the instance, and makes this user the owner of the file's secrets.
 4. It copies the file to /etc/rmf-bridges. Step 5 follows at once, because the new file may not fit
-   the old drop-in.
+   the old drop-in. If the file is there already and not everybody may read it, the instance's user
+   becomes its owner.
 5. It writes the instance's drop-in (`bridges/runtime/drop_in.py`).
 6. It starts the instance.
 
@@ -18,6 +19,7 @@ starts it again.
 
 import argparse
 import os
+import stat
 import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
@@ -111,6 +113,8 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
         yield GiveSecret(secret, user)
     if not target.exists() or not target.samefile(config.path):
         yield WriteFile(target, config.text, config.path)
+    elif not target.is_symlink() and not target.stat().st_mode & stat.S_IROTH:  # it has a secret
+        yield GiveSecret(target, user)
     yield WriteFile(root / drop_in_file(name), drop_in.text(config, present, user).encode())
     yield Run(("systemctl", "daemon-reload"), running_only=True)
     yield Run(("systemctl", "enable", "rmf-bridges.target", unit(name)))

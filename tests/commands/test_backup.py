@@ -19,6 +19,7 @@ from bridges.commands import backup
 from bridges.commands.backup import AHEAD_S, FRESH_S, PAGE_USERS
 from bridges.runtime.runtime_directory import KEPT
 from bridges.runtime.services import make_user
+from bridges.system.directories import user_of
 
 ROOT = Path(__file__).parents[2]
 WANTS = "etc/systemd/system/rmf-bridges.target.wants"
@@ -293,6 +294,7 @@ def test_a_service_whose_yaml_is_a_secret_is_named_at_the_backup_and_at_the_rest
     )
     assert calls == []
     shutil.copy(ward, new / "etc/rmf-bridges/ward.yaml")  # a person has copied it
+    (new / "etc/passwd").write_text(f"{user_of('ward')}:x:{os.geteuid()}:0::/:/usr/sbin/nologin\n")
     assert restored(new, file) == 0
     assert calls[-1][-1] == "rmf-bridge@ward.service"
 

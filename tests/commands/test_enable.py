@@ -369,6 +369,21 @@ def test_a_secret_becomes_the_services_own(tmp_path: Path, calls: list[list[str]
     assert given not in list(enable.steps(load(file), tmp_path, []))
 
 
+@pytest.mark.parametrize(("mode", "given"), [(0o600, True), (0o640, True), (0o644, False)])
+def test_an_installed_file_that_not_everybody_may_read_becomes_the_services_own(
+    tmp_path: Path, calls: list[list[str]], mode: int, given: bool
+) -> None:
+    installed = tmp_path / TARGET
+    installed.parent.mkdir(parents=True)
+    installed.write_bytes(LIFT.read_bytes())
+    installed.chmod(mode)
+    (tmp_path / "etc/passwd").write_text(f"{USER}:x:{os.geteuid()}:0::/:/usr/sbin/nologin\n")
+    planned = list(enable.steps(load(installed), tmp_path, []))
+    assert (GiveSecret(installed, USER) in planned) == given
+    assert main(["enable", str(installed), "--root", str(tmp_path)]) == 0
+    assert installed.stat().st_mode & 0o777 == mode
+
+
 def test_two_services_cannot_have_one_secret(
     tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
