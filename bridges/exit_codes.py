@@ -17,7 +17,9 @@ ROOT: Final = {
     74: "a file was not written",
     77: "not root",
 }
-SYSTEMS: Final = "a program of systemd failed and said why; other codes of it are possible"
+SYSTEMS: Final = (
+    "a program of systemd is missing, or failed and said why; other codes of it are possible"
+)
 GRAPH: Final = "nothing was heard, or the graph cannot be joined"
 RECORDING: Final = {66: "the recording cannot be read"}
 SIMULATION: Final = {
@@ -29,7 +31,8 @@ SIMULATION: Final = {
 }
 ORDERED: Final = {
     4: "the order was refused (the reason is printed)",
-    69: "the daemon does not answer, or this user may not see it or send it a signal",
+    69: "the order cannot be written, the daemon does not answer, or this user may not see it or send"
+    " it a signal",
 }
 SENT: Final = {
     0: "the effect was seen",

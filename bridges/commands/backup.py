@@ -13,7 +13,8 @@ secrets out and names them. It also names each service that has no YAML in the b
 The backup has the content behind a link, because the file behind the link may be in no backup.
 
 A memory is restored only if it is at most FRESH_S old. An older memory may say that a robot holds a
-door, although the robot has left. If the daemon restored that hold, it would open the door.
+door, although the robot has left. If the daemon restored that hold, it would open the door. If this
+machine's clock is behind the memory's time, the memory's age is unknown, so it is left out too.
 """
 
 import argparse
@@ -38,6 +39,8 @@ from bridges.system.directories import SERVICE_STATE
 from drivers.profiles import texts
 
 FRESH_S: Final = 3600.0
+AHEAD_S: Final = 60.0
+"""The time (s) by which a memory may be newer than this machine's clock. Two clocks differ by less."""
 MOST_BYTES: Final = 16 << 20
 WANTS: Final = Path("etc/systemd/system/rmf-bridges.target.wants")
 PAGE_USERS: Final = Path("var/lib/rmf-bridge-page/passwords")
@@ -102,19 +105,23 @@ def _save(file: Path, root: Path, *, dry_run: bool) -> int:
 
 
 def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
-    """Write a new archive. Raises OSError, even if only the file exists already, because it may be
-    another backup."""
+    """Write a new archive, or leave none. Raises OSError, even if only the file exists already, because
+    it may be another backup."""
     opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with (
-        open(opened, "wb") as out,
-        tarfile.open(fileobj=out, mode="w:gz", dereference=True) as archive,  # no links
-    ):
-        for path in kept:
-            name = str(path.relative_to(root))
-            if path.parent == root / WANTS:
-                archive.addfile(tarfile.TarInfo(name))
-            else:
-                archive.add(path, name, recursive=False)
+    try:
+        with (
+            open(opened, "wb") as out,
+            tarfile.open(fileobj=out, mode="w:gz", dereference=True) as archive,  # no links
+        ):
+            for path in kept:
+                name = str(path.relative_to(root))
+                if path.parent == root / WANTS:
+                    archive.addfile(tarfile.TarInfo(name))
+                else:
+                    archive.add(path, name, recursive=False)
+    except BaseException:  # Ctrl-C too: half an archive would block the next try
+        file.unlink(missing_ok=True)
+        raise
 
 
 def _is_ours(name: str) -> bool:
@@ -257,11 +264,16 @@ def _configs(
 
 
 def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
-    """Return whether a daemon's memory is at most FRESH_S old. Otherwise print that it is left out."""
-    fresh = time.time() - mtime <= FRESH_S
-    if not fresh:
+    """Return whether a daemon's memory is at most FRESH_S old. Otherwise print that it is left out, and
+    why."""
+    age_s = time.time() - mtime
+    if age_s < -AHEAD_S:
+        print(
+            f"left out, because it is newer than this machine's clock, which may be wrong: /{path}"
+        )
+    elif age_s > FRESH_S:
         print(f"left out, because it is older than {FRESH_S / 3600:g} h: /{path}")
-    return fresh
+    return -AHEAD_S <= age_s <= FRESH_S
 
 
 def _write(path: Path, content: bytes, *, private: bool) -> int:

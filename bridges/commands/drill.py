@@ -26,7 +26,8 @@ def run(args: argparse.Namespace) -> int:
     """Return 0 if the drill has begun or ended. Return 1 if no daemon runs, and 4 if the daemon
     refused.
 
-    Return 69 if the daemon does not answer, or if this user may not see the daemon or send it a signal.
+    Return 69 if the order cannot be written, if the daemon does not answer, or if this user may not see
+    the daemon or send it a signal.
     """
     for_s = 0.0 if args.end else args.for_s
     if not args.end and not 1.0 <= for_s <= LONGEST_S:

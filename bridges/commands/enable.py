@@ -6,8 +6,10 @@ The command takes these steps:
 2. It stops a running instance, which switches the instance's outputs off. It must do so before step 5,
    because the new drop-in (systemd's file of settings for one instance) may forbid access to the old
    relay.
-3. It copies the file to /etc/rmf-bridges.
-4. It makes a user for the instance, and makes this user the owner of the file's secrets.
+3. It makes a user for the instance, and makes this user the owner of the file's secrets.
+4. It copies the file to /etc/rmf-bridges. Step 5 follows at once, because the new file may not fit
+   the old drop-in. If the file is there already and not everybody may read it, the instance's user
+   becomes its owner.
 5. It writes the instance's drop-in (`bridges/runtime/drop_in.py`).
 6. It starts the instance.
 
@@ -17,6 +19,7 @@ starts it again.
 
 import argparse
 import os
+import stat
 import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
@@ -30,6 +33,7 @@ from bridges.runtime.services import (
     CONFIG,
     INSTANCE,
     NO_INSTANCE,
+    NOTIFY,
     SYSTEMD,
     GiveSecret,
     Run,
@@ -50,6 +54,10 @@ from bridges.system.directories import GROUPS, user_of
 
 FLEET: Final = "fleet"
 BESIDE: Final = f"a fleet's YAML: write whole paths, or copy both files of RMF to /{CONFIG}"
+RESERVED: Final = (
+    f"/{CONFIG}/{NOTIFY}.yaml has the recipients of rmf-bridge {NOTIFY}, so no service can have this"
+    " name: rename {}"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,6 +74,10 @@ def run(args: argparse.Namespace) -> int:
     """Return 0 if the service runs, 78 for an invalid file, and 77 if the user is not root."""
     if not INSTANCE.fullmatch(args.file.stem):
         print(NO_INSTANCE.format(args.file.stem), file=sys.stderr)
+        return os.EX_CONFIG
+    # An upgrade still renews the drop-in of a service that an older version has enabled.
+    if args.file.stem == NOTIFY and not args.drop_in:
+        print(RESERVED.format(args.file), file=sys.stderr)
         return os.EX_CONFIG
     try:
         config = load(args.file)
@@ -96,11 +108,13 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
     target = root / CONFIG / f"{name}.yaml"
     yield Run(("systemctl", "stop", unit(name)), running_only=True)
     yield switch_off(name)
-    if not target.exists() or not target.samefile(config.path):
-        yield WriteFile(target, config.text, config.path)
     yield make_user(name)
     for secret in _secrets(config, root):
         yield GiveSecret(secret, user)
+    if not target.exists() or not target.samefile(config.path):
+        yield WriteFile(target, config.text, config.path)
+    elif not target.is_symlink() and not target.stat().st_mode & stat.S_IROTH:  # it has a secret
+        yield GiveSecret(target, user)
     yield WriteFile(root / drop_in_file(name), drop_in.text(config, present, user).encode())
     yield Run(("systemctl", "daemon-reload"), running_only=True)
     yield Run(("systemctl", "enable", "rmf-bridges.target", unit(name)))

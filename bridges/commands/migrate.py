@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import shutil
 import sys
 from pathlib import Path
 
@@ -46,10 +45,7 @@ def _written(config: Config, text: str) -> int:
         return 0
     real = config.path.resolve()
     try:
-        before = real.stat()
-        files.replace(real, text.encode())
-        shutil.chown(real, before.st_uid, before.st_gid)
-        real.chmod(before.st_mode)
+        files.replace(real, text.encode(), like=real.stat())
     except OSError as error:
         return not_written(config.path, error.strerror)
     print(f"{config.path} is rewritten")

@@ -22,7 +22,8 @@ def run(args: argparse.Namespace) -> int:
     """Return 0 if every device accepted the reset. Return 1 if no daemon runs, and 4 if a device
     refused.
 
-    Return 69 if the daemon does not answer, or if this user may not see the daemon or send it a signal.
+    Return 69 if the order cannot be written, if the daemon does not answer, or if this user may not see
+    the daemon or send it a signal.
     """
     try:
         places = order.places_of(args.file, args.runtime_dir)

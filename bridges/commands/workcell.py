@@ -37,7 +37,8 @@ def run(args: argparse.Namespace) -> int:
     """Return 0 if the daemon accepted the decision. Return 1 if no daemon runs or nothing is in doubt,
     and 4 if the daemon refused the decision.
 
-    Return 69 if the daemon does not answer, or if this user may not see the daemon or send it a signal.
+    Return 69 if the order cannot be written, if the daemon does not answer, or if this user may not see
+    the daemon or send it a signal.
     """
     try:
         places = order.places_of(args.file, args.runtime_dir)

@@ -30,7 +30,7 @@ from bridges.runtime.holder import STATUS, STATUS_MAX, LockHolder
 from bridges.runtime.runtime_directory import find
 from bridges.runtime.signals import RESET
 from bridges.system import files
-from bridges.system.directories import Directories, act_as_owner, opened
+from bridges.system.directories import Directories, act_as_owner, opened, usual_runtimes
 from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
@@ -93,6 +93,20 @@ def places_of(file: Path, given: str | None) -> Directories | None:
         return None
     places = find(file.absolute(), given)
     act_as_owner(places)
+    return _where_it_runs(places)
+
+
+def _where_it_runs(places: Directories) -> Directories:
+    """Return these directories with the runtime directory that their daemon uses. A daemon that was
+    started without a login, as by cron, uses another one than a login shell would. Both use the same
+    state directory, which names the daemon."""
+    daemon = holder.look(places)
+    if daemon is None or holder.written(places.runtime) == daemon:
+        return places
+    for runtime in usual_runtimes(os.geteuid(), places.runtime.name):
+        with suppress(OSError), opened(runtime, ours=True):
+            if holder.written(runtime) == daemon:
+                return Directories(runtime, places.state)
     return places
 
 
@@ -100,8 +114,8 @@ def give(file: Path, places: Directories, **order: Any) -> int:
     """Give an order to the daemon of this file, and wait for the daemon's answer. `order` has fields of
     `PersonsOrder`.
 
-    If the daemon does not obey, print the reason. Return the exit code. Raises PermissionError if this
-    user may not see or signal the daemon.
+    If the daemon does not obey, or if the order cannot be written, print the reason. Return the exit
+    code. Raises PermissionError if this user may not see or signal the daemon.
     """
     found = holder.look(places)
     if found is None or not found.serves or not found.started:  # another process may have this pid
@@ -117,6 +131,13 @@ def give(file: Path, places: Directories, **order: Any) -> int:
     except ProcessLookupError:
         print(f"the daemon of {file} has just ended", file=sys.stderr)
         return 1
+    except PermissionError:
+        raise
+    except OSError as error:
+        to_do = "if the daemon uses another directory, give it with --runtime-dir"
+        why = f"{places.runtime}: {error.strerror or error}; {to_do}"
+        print(f"the order to the daemon of {file} cannot be written: {why}", file=sys.stderr)
+        return os.EX_UNAVAILABLE
     return _wait(file, places, given)
 
 

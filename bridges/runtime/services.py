@@ -22,7 +22,14 @@ CONFIG: Final = Path("etc/rmf-bridges")
 SYSTEMD: Final = Path("etc/systemd/system")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 """The pattern of a service's name. It allows only characters that systemd does not escape."""
+NOTIFY: Final = "notify"
+"""The name that no new service may have. `/etc/rmf-bridges/notify.yaml` has the recipients of
+`rmf-bridge-notify.service`."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
+NO_SYSTEMD: Final = (
+    "{} is missing, and this command needs systemd. Without systemd, start the daemon with"
+    " rmf-bridge run FILE"
+)
 LEFT_ON: Final = (
     "the outputs of {} are not verified off, and a new drop-in may block access to them: mend the"
     " device and try again. If the device will not answer again, cut its relays' supply, then: rm {}"
@@ -44,12 +51,13 @@ def service_name(text: str) -> str:
 
 
 def services(root: Path = Path("/")) -> set[str]:
-    """Return the names of this machine's services. Each has a YAML in /etc/rmf-bridges, a file of
-    systemd, a record of claimed outputs, or, if the system runs, a systemd unit."""
+    """Return the names of this machine's services. Each has a YAML in /etc/rmf-bridges (other than the
+    recipients of `notify`), a file of systemd, a record of claimed outputs, or, if the system runs, a
+    systemd unit."""
     system = root / SYSTEMD
     links = {*system.glob(f"*.wants/{UNIT}*.service"), *system.glob(f"{UNIT}*.service.d")}
     names = {link.name.removesuffix(".d")[len(UNIT) :].removesuffix(".service") for link in links}
-    names |= {file.stem for file in (root / CONFIG).glob("*.yaml")}
+    names |= {file.stem for file in (root / CONFIG).glob("*.yaml")} - {NOTIFY}
     records = (root / SERVICE_STATE.relative_to("/")).glob(f"*/{PATTERN}")
     names |= {record.parent.name for record in records}
     return names | set(units()) if root == Path("/") else names
@@ -170,7 +178,10 @@ def not_possible(args: argparse.Namespace) -> int:
 
 
 def _did(words: Sequence[str]) -> bool:
-    return subprocess.run(words).returncode == 0
+    try:
+        return subprocess.run(words).returncode == 0
+    except OSError:
+        return False
 
 
 def _show(step: Step) -> None:
@@ -203,7 +214,11 @@ def _taken(step: Step, root: Path) -> int:
     match step:
         case Run(words):
             where = [] if root == Path("/") else [f"--root={root}"]
-            return subprocess.run([words[0], *where, *words[1:]]).returncode
+            try:
+                return subprocess.run([words[0], *where, *words[1:]]).returncode
+            except FileNotFoundError:
+                print(NO_SYSTEMD.format(words[0]), file=sys.stderr)
+                return 1
         case SwitchOff(words, state):
             return _off(words, state)
         case WriteFile(path, content):

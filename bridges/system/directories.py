@@ -98,8 +98,8 @@ def everywhere(file: Path) -> Iterator[Directories]:
 def _of_user(uid: int, file: Path) -> Iterator[Directories]:
     """Yield the directories of the user `uid` for this file. Leave out directories that another user
     owns."""
-    for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
-        runtime = base / "rmf-bridge" / file.stem
+    for runtime in usual_runtimes(uid, file.stem):
+        base = runtime.parents[1]
         try:
             home = Path(pwd.getpwuid(uid).pw_dir)
             his = base.lstat().st_uid == uid and runtime.lstat().st_uid == uid
@@ -107,6 +107,13 @@ def _of_user(uid: int, file: Path) -> Iterator[Directories]:
             continue
         if his:
             yield Directories(runtime, home / ".local/state/rmf-bridge" / file.stem)
+
+
+def usual_runtimes(uid: int, name: str) -> Iterator[Path]:
+    """Yield the runtime directories in which the user `uid` may have a daemon that was started by hand:
+    with a login's XDG_RUNTIME_DIR, and without it."""
+    for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
+        yield base / "rmf-bridge" / name
 
 
 def runtimes() -> Iterator[Path]:

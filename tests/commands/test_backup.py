@@ -10,14 +10,16 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from textwrap import indent
+from typing import Any
 
 import pytest
 
 from bridges import cli
 from bridges.commands import backup
-from bridges.commands.backup import FRESH_S, PAGE_USERS
+from bridges.commands.backup import AHEAD_S, FRESH_S, PAGE_USERS
 from bridges.runtime.runtime_directory import KEPT
 from bridges.runtime.services import make_user
+from bridges.system.directories import user_of
 
 ROOT = Path(__file__).parents[2]
 WANTS = "etc/systemd/system/rmf-bridges.target.wants"
@@ -120,6 +122,27 @@ def test_an_old_memory_is_not_restored_because_it_would_open_a_door(
     assert f"left out, because it is older than 1 h: /{MEMORY}" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("ahead_s", "fresh"), [(AHEAD_S - 30, True), (86400.0, False)])
+def test_a_memory_from_the_future_is_not_restored_because_a_wrong_clock_hides_its_age(
+    machine: Path,
+    tmp_path: Path,
+    calls: list[list[str]],
+    capsys: pytest.CaptureFixture[str],
+    ahead_s: float,
+    fresh: bool,
+) -> None:
+    later = time.time() + ahead_s
+    os.utime(machine / MEMORY, (later, later))
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    saved(machine, file)
+    assert restored(new, file) == 0
+    why = "left out, because it is newer than this machine's clock, which may be wrong"
+    assert (MEMORY in content(new), f"{why}: /{MEMORY}" not in capsys.readouterr().out) == (
+        fresh,
+        fresh,
+    )
+
+
 def test_a_backup_with_an_invalid_yaml_changes_nothing(
     machine: Path, tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -176,6 +199,31 @@ def test_a_second_backup_does_not_overwrite_the_first_and_a_dry_run_writes_nothi
     file.write_text("another file")
     assert cli.main(line) == os.EX_CANTCREAT
     assert file.read_text() == "another file"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is Linux's")
+def test_a_backup_that_finds_no_room_leaves_no_file_and_the_next_try_succeeds(
+    machine: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file, real = tmp_path / "backup.tar.gz", os.open
+
+    def on_a_full_disk(path: Path, flags: int, mode: int = 0o777, **rest: Any) -> int:
+        opened = real(path, flags, mode, **rest)
+        if path == file:
+            full = real("/dev/full", os.O_WRONLY)
+            os.dup2(full, opened)
+            os.close(full)
+        return opened
+
+    with monkeypatch.context() as disk:
+        disk.setattr(os, "open", on_a_full_disk)
+        assert saved(machine, file) == os.EX_CANTCREAT
+    assert capsys.readouterr().err == f"{file} cannot be written: No space left on device\n"
+    assert not file.exists()
+    assert saved(machine, file) == 0
 
 
 def test_a_machine_without_files_has_nothing_to_save(tmp_path: Path) -> None:
@@ -246,6 +294,7 @@ def test_a_service_whose_yaml_is_a_secret_is_named_at_the_backup_and_at_the_rest
     )
     assert calls == []
     shutil.copy(ward, new / "etc/rmf-bridges/ward.yaml")  # a person has copied it
+    (new / "etc/passwd").write_text(f"{user_of('ward')}:x:{os.geteuid()}:0::/:/usr/sbin/nologin\n")
     assert restored(new, file) == 0
     assert calls[-1][-1] == "rmf-bridge@ward.service"
 

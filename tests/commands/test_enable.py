@@ -53,8 +53,8 @@ def test_an_instance_is_stopped_and_off_before_its_file_and_drop_in_change(tmp_p
     assert list(enable.steps(config, tmp_path, ["gpio"])) == [
         Run(("systemctl", "stop", UNIT), running_only=True),
         switch_off("lift_dry_contact"),
-        WriteFile(tmp_path / TARGET, LIFT.read_bytes(), LIFT),
         make_user("lift_dry_contact"),
+        WriteFile(tmp_path / TARGET, LIFT.read_bytes(), LIFT),
         WriteFile(tmp_path / DROP_IN, drop_in.text(config, ["gpio"], USER).encode()),
         Run(("systemctl", "daemon-reload"), running_only=True),
         Run(("systemctl", "enable", "rmf-bridges.target", UNIT)),
@@ -143,8 +143,8 @@ def test_a_dry_run_prints_every_step_and_does_nothing(
         f"{off}   # if a dead daemon left a record in /var/lib/rmf-bridge/lift_dry_contact",
         f"rm /{DROP_IN}",
         "systemctl daemon-reload",
-        f"install -m 644 {LIFT} {tmp_path / TARGET}",
         shlex.join(make_user("lift_dry_contact").words),
+        f"install -m 644 {LIFT} {tmp_path / TARGET}",
         f"write {tmp_path / DROP_IN}:",
     ]
     assert (calls, list(tmp_path.iterdir())) == ([], [])
@@ -198,8 +198,36 @@ def test_a_file_that_cannot_name_a_service_is_refused(
     assert "is not a service name" in capsys.readouterr().err
 
 
+def test_the_recipients_of_notify_are_no_service_and_no_service_takes_their_place(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipients = tmp_path / "root/etc/rmf-bridges/notify.yaml"
+    recipients.parent.mkdir(parents=True)
+    recipients.write_text("recipients: {}\n")
+    file, root = tmp_path / "notify.yaml", ["--root", str(tmp_path / "root")]
+    file.write_bytes(LIFT.read_bytes())
+    assert main(["enable", str(file), *root]) == os.EX_CONFIG
+    assert capsys.readouterr().err == enable.RESERVED.format(file) + "\n"
+    assert recipients.read_text() == "recipients: {}\n"
+    assert main(["disable", "notify", *root]) == os.EX_USAGE
+    assert capsys.readouterr().err == "no service notify; there is none\n"
+    assert calls == []
+
+
+def test_a_service_named_notify_of_an_earlier_version_can_be_upgraded_and_disabled(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, root = tmp_path / "notify.yaml", ["--root", str(tmp_path)]
+    file.write_bytes(LIFT.read_bytes())
+    assert main(["enable", "--drop-in", str(file), *root]) == 0
+    left = tmp_path / "etc/systemd/system/rmf-bridge@notify.service.d/10-enable.conf"
+    left.parent.mkdir(parents=True)
+    left.write_text(capsys.readouterr().out)
+    assert main(["disable", "notify", *root]) == 0
+
+
 def _told(file: Path, root: Path) -> argparse.Namespace:
-    return argparse.Namespace(file=file, root=root, dry_run=True, no_start=False)
+    return argparse.Namespace(file=file, root=root, dry_run=True, no_start=False, drop_in=False)
 
 
 def test_only_root_changes_a_running_system(
@@ -281,6 +309,43 @@ def test_after_a_failed_step_the_stopped_service_starts_again(
     assert "the steps after the failed step were not taken" in capsys.readouterr().err
 
 
+def test_a_service_whose_user_cannot_be_made_starts_again_with_its_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    called = list[str]()
+
+    def run(words: list[str]) -> "subprocess.CompletedProcess[bytes]":
+        called.append(words[0])
+        return subprocess.CompletedProcess(words, int(words[0] == "systemd-sysusers"))
+
+    monkeypatch.setattr(subprocess, "run", run)
+    installed = tmp_path / TARGET
+    installed.parent.mkdir(parents=True)
+    installed.write_text("old")
+    live = _told(LIFT, Path("/"))
+    live.dry_run = False
+    assert carry_out(enable.steps(load(LIFT), tmp_path, []), live, keeps=UNIT) == 1
+    assert called == ["systemctl", "systemctl", "systemd-sysusers", "systemctl"]
+    assert installed.read_text() == "old"
+
+
+@pytest.mark.parametrize("words", [["enable", str(LIFT)], ["disable", "lift_dry_contact"]])
+def test_a_machine_without_systemd_is_told_and_not_changed(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(disable, "services", lambda root: {"lift_dry_contact"})
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(words) == 1
+    *_, why, end = capsys.readouterr().err.splitlines()
+    assert why == services.NO_SYSTEMD.format("systemctl")
+    assert end == "the steps after the failed step were not taken"
+
+
 def with_token(file: Path) -> Path:
     """Write the YAML of a door that needs a token. The door's name is the name of the file."""
     text = (CONFIG / "door_http.yaml").read_text().replace("side_door", file.stem)
@@ -302,6 +367,21 @@ def test_a_secret_becomes_the_services_own(tmp_path: Path, calls: list[list[str]
     secret.rename(secret.with_suffix(".old"))
     secret.symlink_to(secret.with_suffix(".old"))
     assert given not in list(enable.steps(load(file), tmp_path, []))
+
+
+@pytest.mark.parametrize(("mode", "given"), [(0o600, True), (0o640, True), (0o644, False)])
+def test_an_installed_file_that_not_everybody_may_read_becomes_the_services_own(
+    tmp_path: Path, calls: list[list[str]], mode: int, given: bool
+) -> None:
+    installed = tmp_path / TARGET
+    installed.parent.mkdir(parents=True)
+    installed.write_bytes(LIFT.read_bytes())
+    installed.chmod(mode)
+    (tmp_path / "etc/passwd").write_text(f"{USER}:x:{os.geteuid()}:0::/:/usr/sbin/nologin\n")
+    planned = list(enable.steps(load(installed), tmp_path, []))
+    assert (GiveSecret(installed, USER) in planned) == given
+    assert main(["enable", str(installed), "--root", str(tmp_path)]) == 0
+    assert installed.stat().st_mode & 0o777 == mode
 
 
 def test_two_services_cannot_have_one_secret(

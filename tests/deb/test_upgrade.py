@@ -165,3 +165,17 @@ def test_an_installation_after_a_removal_starts_the_earlier_services_and_a_purge
     made.dpkg("-P", "rmf-bridges")
     left = [p for p in made.root.rglob("*") if "rmf" in p.name]
     assert left == []
+
+
+def test_a_removal_and_a_purge_name_each_service_that_is_not_verified_off(
+    tmp_path: Path, debs: dict[str, Path]
+) -> None:
+    made = system(tmp_path, debs[ONE])
+    record = made.root / "var/lib/rmf-bridge/door/claimed-1.json"
+    record.parent.mkdir()
+    record.touch()
+    told = f"door: not verified off: cut its relays' supply before anybody works on it ({record})\n"
+    for words in ("-r", "-P"):
+        done = made.dpkg(words, "rmf-bridges")
+        assert (done.returncode, done.stderr.count(told)) == (0, 1)
+    assert not record.parent.parent.exists()

@@ -5,14 +5,18 @@
 
 import importlib.util
 import json
+import operator
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
 
+import jinja2
 import pytest
 import yaml
 
@@ -216,6 +220,11 @@ def script(file: str, name: str, root: Path) -> str:
     text = str(*(task["ansible.builtin.shell"] for task in tasks if task["name"] == name))
     text = text.replace("{{ rmf_served | map('quote') | join(' ') }}", "ward")
     text = text.replace("{{ rmf_old.stdout }}", "0.1.0").replace("tar -C / ", f"tar -C {root} ")
+    return in_root(text, root)
+
+
+def in_root(text: str, root: Path) -> str:
+    """Return a shell script with this folder as the root of its files."""
     for folder in ("/etc/", "/var/", "/run/"):
         text = re.sub(rf"(?<![\w$/]){folder}", f"{root}{folder}", text)
     return text
@@ -260,6 +269,43 @@ def test_each_old_file_comes_back_even_a_secret_and_only_new_services_are_remove
         "rmf-bridge disable lab",
         f"rmf-bridge enable {config}/ward.yaml",
     ]
+
+
+@pytest.mark.parametrize(
+    ("yaml_changed", "beside_changed", "enabled"),
+    [(False, False, False), (True, False, True), (False, True, True)],
+)
+def test_a_service_starts_again_if_its_file_or_a_file_beside_it_has_changed(
+    tmp_path: Path, yaml_changed: bool, beside_changed: bool, enabled: bool
+) -> None:
+    tasks = yaml.safe_load((COLLECTION / "roles/daemon/tasks/services.yml").read_text())
+    _, copied, enable = tasks
+    jinja = jinja2.Environment()
+    jinja.filters.update(basename=os.path.basename, splitext=os.path.splitext, quote=shlex.quote)
+    jinja.tests["changed"] = operator.truth
+    given = {"item": "machines/pi/ward.yaml", copied["register"]: beside_changed}
+    text = in_root(jinja.from_string(enable["ansible.builtin.shell"]).render(given), tmp_path)
+    programs = tmp_path / "bin"
+    for folder in (programs, tmp_path / "etc/rmf-bridges", tmp_path / "run/rmf-bridges-rollout"):
+        folder.mkdir(parents=True)
+    for name in ("systemctl", "rmf-bridge"):
+        (programs / name).symlink_to(shutil.which("true") or "")
+    (tmp_path / "etc/rmf-bridges/ward.yaml").write_text("old")
+    new = tmp_path / "run/rmf-bridges-rollout/ward.yaml"
+    new.write_text("new" if yaml_changed else "old")
+    env = os.environ | {"PATH": f"{programs}:{os.environ['PATH']}"}
+    done = subprocess.run(["sh", "-c", text], env=env, capture_output=True, text=True)
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "enabled\n" if enabled else "")
+
+
+def test_a_rollout_proves_the_files_beside_the_device_yamls_too() -> None:
+    change = yaml.safe_load((COLLECTION / "playbooks/tasks/change.yml").read_text())[-1]
+    (prove,) = [
+        task["vars"]
+        for task in change["block"][0]["block"]
+        if task.get("ansible.builtin.include_tasks") == "prove.yml"
+    ]
+    assert prove["proved_files"] == "{{ rmf_files + rmf_beside }}"
 
 
 def test_ansible_reads_the_playbook(tmp_path: Path) -> None:

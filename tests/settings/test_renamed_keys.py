@@ -1,6 +1,9 @@
 """The loader reads a key of an earlier version, and warns. `migrate` rewrites the key in the file."""
 
+import errno
 import os
+import tempfile
+from argparse import Namespace
 from pathlib import Path
 
 import msgspec
@@ -8,10 +11,12 @@ import pytest
 import yaml
 
 from bridges import __version__, cli
+from bridges.commands import migrate
 from bridges.settings import renamed_keys
 from bridges.settings.load import load
 from bridges.settings.renamed_keys import RENAMED, RenamedKey
 from drivers.charger.can_frames import frame_map
+from tests.commands.test_backup import as_nobody
 from tests.settings.reading import RIGHT, problems_of
 from workbench.commands.schema import markdown
 
@@ -187,6 +192,41 @@ def test_the_file_keeps_its_mode_and_its_link(old: Path) -> None:
     assert link.is_symlink()
     assert old.stat().st_mode & 0o777 == 0o640
     assert "stops_unfed_s" not in old.read_text()
+
+
+def test_a_secret_file_is_never_readable_by_others_while_it_is_rewritten(
+    old: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old.chmod(0o600)
+    left = old.with_name(f".{old.name}.new")
+    left.touch(0o644)  # of an interrupted run
+    sync, modes = os.fsync, list[int]()
+
+    def note(opened: int) -> None:
+        modes.append(os.fstat(opened).st_mode & 0o777)
+        sync(opened)
+
+    monkeypatch.setattr(os, "fsync", note)
+    rewritten(old)
+    assert modes[0] == 0o600
+    assert not left.exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+def test_a_user_who_may_not_keep_the_files_owner_changes_nothing(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    with tempfile.TemporaryDirectory(dir="/tmp") as public:  # nobody cannot reach pytest's folders
+        os.chown(public, 65534, 65534)
+        file = Path(public) / "bay.yaml"
+        file.write_text(HEAD + BAY + MAP)
+        before = (file.read_bytes(), file.stat().st_uid, file.stat().st_mode)
+        load(file)  # nobody may not read modules that are loaded later
+        args = Namespace(file=file, dry_run=False)
+        assert as_nobody(lambda: migrate.run(args)) == os.EX_CANTCREAT
+        assert capfd.readouterr().err == f"{file} cannot be written: {os.strerror(errno.EPERM)}\n"
+        assert (file.read_bytes(), file.stat().st_uid, file.stat().st_mode) == before
+        assert list(Path(public).iterdir()) == [file]
 
 
 def test_a_section_that_two_devices_share_by_an_alias_is_changed_once(
