@@ -75,8 +75,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 class CarPosition(msgspec.Struct, frozen=True):
     """The car's position, as far as the core believes the floor code.
 
-    `trusted`: the last landing that was believed. `seen_at`: the time when the car was last seen at
-    that landing. `suspect`: a landing that the floor code shows, but that the car cannot have reached.
+    `trusted`: the last landing that was believed. `seen_at`: the time of the last reading of that
+    landing. `suspect`: a landing that the floor code shows, but that the car cannot have reached.
     `moved_at`: the time of the last reading in which the car did not stand.
     """
 

@@ -9,8 +9,9 @@ LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown, 
    anywhere. After a shorter gap the values stay, and a running debounce starts again. Only the debounce
    of a hazard's begin goes on, so that a bus that fails again and again hides no hazard.
 LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. The code is
-   rejected if it skips floors faster than a car travels. With motion lines the code is also rejected if
-   it changes while the car stands. After a rejection the position is unknown until the code shows the
+   rejected if it skips floors faster than a car travels. That time runs from the last reading of the
+   trusted floor to the first reading of the new floor, without any debounce. With motion lines the code
+   is also rejected if it changes while the car stands. After a rejection the position is unknown until the code shows the
    last trusted floor or another reachable floor, or until an operator resets the lift.
 LIFT-SENSING-4. If the floor code is invalid (`valid_when`) for longer than its debounce, the car may
    move to any floor without being seen. Therefore the next valid floor code is believed.
@@ -213,19 +214,26 @@ def _locate(
         return CarPosition(moved_at=before.moved_at)
     if level is None or level == before.suspect:
         return before
-    if level == before.trusted or _can_have_come(before, level, now, limits):
+    if level == before.trusted:
+        here = sample.level == level
+        return replace(before, seen_at=now if here else before.seen_at, suspect=None)
+    if _can_have_come(before, level, code.since, now, limits):
         return replace(before, trusted=level, seen_at=now, suspect=None)
     return replace(before, suspect=level)
 
 
-def _can_have_come(before: CarPosition, level: str, now: float, limits: LiftLimits) -> bool:
+def _can_have_come(
+    before: CarPosition, level: str, since: float, now: float, limits: LiftLimits
+) -> bool:
+    """Return whether the car can have reached this landing, which the floor code has shown since
+    `since`."""
     if before.trusted is None:
         return True
     memory_s = MOTION_MEMORY_S + limits.debounce_s("floor")
     if before.moved_at is None or now - before.moved_at > memory_s:
         return False
     skipped = limits.floors_between(level, before.trusted)
-    return now - before.seen_at >= skipped * limits.t.floor_travel_min_s
+    return since - before.seen_at >= skipped * limits.t.floor_travel_min_s
 
 
 def _stands(motion: Settled[Motion | None] | None) -> bool:
