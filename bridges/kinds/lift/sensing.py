@@ -17,6 +17,8 @@ LIFT-SENSING-4. If the floor code is invalid (`valid_when`) for longer than its 
    move to any floor without being seen. Therefore the next valid floor code is believed.
 LIFT-SENSING-5. A door is open when its contact for the open door says so. If a door has only one
    contact, its other end position is estimated from the door's travel time, and marked as an estimate.
+   The travel begins when the door leaves its contact. A change of the contact that is shorter than its
+   debounce interrupts the estimate, and does not begin the travel anew.
 LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines the car always counts as
    standing.
 """
@@ -254,7 +256,10 @@ def _door(seen: Settled[DoorReading | None] | None, now: float, limits: LiftLimi
         return DoorSeen(open=value is DoorReading.OPEN, closed=value is DoorReading.CLOSED)
     if seen is None or value not in (DoorReading.NOT_OPEN, DoorReading.NOT_CLOSED):
         return DoorSeen(open=False, closed=False)
-    there_at = seen.since + limits.t.door_travel_s
+    since = seen.since
+    if seen.candidate == value and seen.value_since is not None:
+        since = seen.value_since
+    there_at = since + limits.t.door_travel_s
     if now < there_at:
         return DoorSeen(open=False, closed=False, settles_at=there_at)
     return DoorSeen(

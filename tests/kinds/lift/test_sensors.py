@@ -412,6 +412,22 @@ def test_with_only_a_closed_contact_an_open_door_is_estimated_and_marked() -> No
     assert story.node.status()["door"] == "open (estimated)"
 
 
+def test_a_glitch_of_a_single_contact_restarts_no_estimate() -> None:
+    story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.NOT_CLOSED)), debounce={"door": 0.1})
+    story.run(8.0)
+    story.asks("A", "L1")
+    story.run(9.0)
+    edges = list(story.edges)
+    for _ in range(5):
+        story.building.set(door=DoorReading.CLOSED)
+        story.run(story.now + 0.05)
+        story.building.set(door=DoorReading.NOT_CLOSED)
+        story.run(story.now + 0.2)
+        assert story.state == "AGV, open at L1, A to L1"
+        story.run(story.now + 4.0)
+    assert (story.edges, story.faults) == (edges, [])
+
+
 @pytest.mark.parametrize(
     ("front", "rear", "shown"),
     [
