@@ -11,8 +11,9 @@ LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown, 
 LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. The code is
    rejected if it skips floors faster than a car travels. That time runs from the last reading of the
    trusted floor to the first reading of the new floor, without any debounce. With motion lines the code
-   is also rejected if it changes while the car stands. After a rejection the position is unknown until the code shows the
-   last trusted floor or another reachable floor, or until an operator resets the lift.
+   is also rejected if it changes while the car stands. After a rejection the position is unknown until
+   the code shows the last trusted floor or another reachable floor, or until an operator resets the
+   lift.
 LIFT-SENSING-4. If the floor code is invalid (`valid_when`) for longer than its debounce, the car may
    move to any floor without being seen. Therefore the next valid floor code is believed.
 LIFT-SENSING-5. A door is open when its contact for the open door says so. If a door has only one

@@ -413,7 +413,9 @@ def test_with_only_a_closed_contact_an_open_door_is_estimated_and_marked() -> No
 
 
 def test_a_glitch_of_a_single_contact_restarts_no_estimate() -> None:
-    story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.NOT_CLOSED)), debounce={"door": 0.1})
+    story = Story(
+        Building(replace(OPEN_AT_L1, door=DoorReading.NOT_CLOSED)), debounce={"door": 0.1}
+    )
     story.run(8.0)
     story.asks("A", "L1")
     story.run(9.0)
