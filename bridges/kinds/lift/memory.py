@@ -122,7 +122,8 @@ class OwnWords(msgspec.Struct, frozen=True):
     `stamp`: the newest stamp (ns), by the adapter's clock. `asked_at`: the time of the last request for
     the lift. `ended_at`: the time of the first END after that request. `floor`: the destination of that
     request. `opened`: since that request, OPEN has been published at `floor`. `told`: the adapter has
-    sent a request after that OPEN, so it knows of the open door.
+    sent a request after that OPEN, so it knows of the open door. `clock`: the stamps (s) that show
+    whether a stamp older than `stamp` comes from a clock that was set back.
     """
 
     stamp: int = 0
@@ -131,6 +132,7 @@ class OwnWords(msgspec.Struct, frozen=True):
     floor: str = ""
     opened: bool = False
     told: bool = False
+    clock: Requester = Requester()
 
 
 class Doubted(msgspec.Struct, frozen=True):

@@ -304,7 +304,13 @@ def _robot(robot: OwnWords, by: float) -> OwnWords:
     heard = robot.asked_at > AGES_AGO
     asked_at = max(_at(robot.asked_at, by), -7.0) if heard else AGES_AGO
     ended_at = round(robot.ended_at + by, 6)
-    return replace(robot, stamp=0, asked_at=asked_at, ended_at=_recent(ended_at, 8.0))
+    return replace(
+        robot,
+        stamp=0,
+        asked_at=asked_at,
+        ended_at=_recent(ended_at, 8.0),
+        clock=Requester(),
+    )
 
 
 def _ends(ends: Requester, by: float) -> Requester:
