@@ -1,7 +1,7 @@
 """The values that the lift core keeps from one scan to the next, and the settings that it needs (its
 limits)."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Literal
 
@@ -60,12 +60,14 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         """Count the landings between these two landings."""
         return abs(self.levels[level] - self.levels[other]) - 1
 
-    def floor_name(self, level: str, preferred: str) -> str:
+    def floor_name(self, level: str, preferred: str, opened: Collection[Side] = ()) -> str:
         """Return RMF's name for a landing. A landing may have several names. Return `preferred` if it
-        is one of them, else the first of them."""
-        if preferred in self.stops and self.stops[preferred].level == level:
+        is one of them, else the first of them whose door is one of the `opened` sides, else the first
+        of them."""
+        names = [name for name, stop in self.stops.items() if stop.level == level]
+        if preferred in names:
             return preferred
-        return next(name for name, stop in self.stops.items() if stop.level == level)
+        return next((name for name in names if self.stops[name].side in opened), names[0])
 
     def side(self, floor: str) -> Side:
         """Return the side of the door that serves this floor."""

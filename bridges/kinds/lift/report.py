@@ -7,7 +7,7 @@ from bridges.kinds.lift import drive, forgotten
 from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
 from bridges.kinds.lift.relays import Relays
 from bridges.kinds.lift.sensing import BelievedLift
-from bridges.kinds.lift.signals import Hazard, LiftOutputs, Motion
+from bridges.kinds.lift.signals import Hazard, LiftOutputs, Motion, Side
 from bridges.kinds.shared.decision import NOT_KEPT, AlarmInputs, Fault
 from bridges.messages.definitions import LiftDoor, LiftMode, LiftMotion
 
@@ -62,7 +62,7 @@ def report(
     """Report the present state. `wanted`: the outputs that would be on if no relay had to rest."""
     session, relays = memory.session, memory.relays
     destination = session.destination if session else ""
-    floor = limits.floor_name(view.level, destination) if view.fresh and view.level else ""
+    floor = _floor(session, view, limits) if view.fresh and view.level else ""
     mode = _mode(view, faults, relays)
     door, estimated = _door(session, view, floor, limits)
     if door is LiftDoor.DOOR_OPEN and not _may_enter(memory, floor, mode, wanted, faults):
@@ -83,6 +83,15 @@ def report(
     if session is None or (shown.open_at == destination and session.doubted is None):
         return shown
     return replace(shown, waits=_waits(session, relays, view, wanted, faults, now, limits))
+
+
+def _floor(session: LiftSession | None, view: BelievedLift, limits: LiftLimits) -> str:
+    """Name the car's landing. A landing with two doors has two names. Its name is the session's
+    destination. Without a session it is the floor whose door is open."""
+    assert view.level
+    if session:
+        return limits.floor_name(view.level, session.destination)
+    return limits.floor_name(view.level, "", [side for side in Side if view.door(side).open])
 
 
 def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -> tuple[Fault, ...]:

@@ -370,11 +370,15 @@ def test_a_door_without_wires_is_never_shown_open() -> None:
     assert story.state == "AGV, moving at L2_rear, A to L2_rear"
 
 
-def test_without_a_session_either_open_door_is_shown() -> None:
+def test_without_a_session_either_open_door_is_shown_at_its_floor() -> None:
     building = Building(replace(at("L2"), rear_door=DoorReading.OPEN))
     story = Story(building, floors=TWO_DOORS)
     story.run(1.0)
+    assert story.state == "AGV, open at L2_rear"
+    building.set(door=DoorReading.OPEN)
+    story.run(1.5)
     assert story.state == "AGV, open at L2"
+    building.set(door=DoorReading.CLOSED)
     building.set(rear_door=DoorReading.BETWEEN)
     story.run(2.0)
     assert story.state == "AGV, moving at L2"
