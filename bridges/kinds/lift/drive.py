@@ -51,7 +51,8 @@ def is_not_seen_to_stand(session: LiftSession, view: BelievedLift, limits: LiftL
 
 
 def _shows_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
-    return view.level == limits.stops[session.destination].level
+    stop = limits.stops.get(session.destination)  # a session in HUMAN mode may have no destination
+    return stop is not None and view.level == stop.level
 
 
 def agv_ok(view: BelievedLift) -> bool:

@@ -80,7 +80,8 @@ def report(
         boarded=bool(session and session.boarded),
         alarm=AlarmInputs(frozenset(map(str, limits.alarm_on & view.hazards)), view.fresh),
     )
-    if session is None or (shown.open_at == destination and session.doubted is None):
+    fulfilled = shown.open_at and shown.open_at == destination
+    if session is None or (fulfilled and session.doubted is None):
         return shown
     return replace(shown, waits=_waits(session, relays, view, wanted, faults, now, limits))
 

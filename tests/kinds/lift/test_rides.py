@@ -9,7 +9,17 @@ from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftSample, Mot
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.messages.definitions import LiftMode, LiftMotion, LiftRequest, LiftState, Time
 from bridges.messages.stamps import in_seconds
-from tests.kinds.lift.story import AGV, END, HUMAN, STANDING, WALL, Building, Controller, Story
+from tests.kinds.lift.story import (
+    AGV,
+    END,
+    HUMAN,
+    STANDING,
+    WALL,
+    Building,
+    Controller,
+    Story,
+    boarding,
+)
 
 SUMMARY = ("mode", "floor", "door", "motion", "session", "boarded", "destination")
 IDLE_AT_L1 = [(0.0, "OFFLINE, moving at ?"), (0.1, "HUMAN, closed at L1")]
@@ -204,6 +214,31 @@ def test_human_mode_requested_by_a_stranger_is_a_session_without_outputs() -> No
     assert story.outputs == LiftOutputs(agv_request=True)
 
 
+def test_human_mode_needs_no_floor() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(5.0)
+    story.asks("A", "", HUMAN)
+    story.run(6.0)
+    assert (story.state, story.outputs) == ("HUMAN, moving at L1, A to ", LiftOutputs())
+    assert story.node.status()["waits"] == "for END: in HUMAN mode people call the lift"
+    story.ends("A")
+    story.run(10.0)
+    story.asks("rmf-web", "L9", HUMAN)
+    story.run(11.0)
+    assert (story.state, story.faults) == ("HUMAN, closed at L1, rmf-web to ", [])
+    assert story.node.refused == {}
+
+
+def test_the_grace_of_a_session_without_a_floor_has_no_outputs() -> None:
+    story = boarding()
+    story.asks("A", "", HUMAN)
+    story.ends("A")
+    story.run(10.0)
+    assert (story.state, story.outputs) == ("AGV, open at L1", LiftOutputs())
+
+
 def test_an_open_door_in_human_mode_is_not_offered_for_boarding() -> None:
     story = Story(Building(at("L1", DoorReading.OPEN, agv=False)))
     story.run(1.0)
@@ -395,7 +430,7 @@ def test_without_a_session_either_open_door_is_shown_at_its_floor() -> None:
         (LiftRequest("Lift1", Time(), "x" * 257, 1, "L1", 2), "impossible session_id"),
         (LiftRequest("Lift1", Time(), "A", 3, "L1", 2), "unknown request_type"),
         (LiftRequest("Lift1", Time(), "A", 1, "L1", 1), "unknown door_state"),
-        (LiftRequest("Lift1", Time(), "A", 2, "", 2), "floor not served"),
+        (LiftRequest("Lift1", Time(), "A", 1, "", 2), "floor not served"),
     ],
 )
 def test_an_impossible_request_to_a_lift_is_refused_by_name(
