@@ -209,8 +209,10 @@ def _take(
 def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits) -> LiftMemory:
     """Add a reading to the memory. If no write has failed since the last reading, note that the outputs
     were written."""
+    relays = memory.relays if memory.write_failed else memory.relays.confirm(now)
     return replace(
         memory,
+        relays=relays,
         senses=take(memory.senses, sample, now, limits),
         io_fault=memory.io_fault if memory.write_failed else "",
         unwritten_since=memory.unwritten_since if memory.write_failed else None,
@@ -297,6 +299,7 @@ def _wake_at(
     due = [
         view.changes_at,
         memory.relays.changes_at(outputs, now, limits.t),
+        memory.relays.read_at(),
         _unwritten_at(memory, limits),
     ]
     if memory.session:

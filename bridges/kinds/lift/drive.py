@@ -14,7 +14,8 @@ LIFT-DRIVE-2. AGV mode comes first, then the call to the destination. The door's
 LIFT-DRIVE-3. A call is given only if the car is not at the destination, and only without overload.
    Except with `by_call`, a call also needs AGV mode. A door command is given only in AGV mode, when the
    car stands at the destination's landing. A call and a door command are never on together. A call or a
-   door command comes on only after all calls and door commands have been off for `dead_time_s`.
+   door command comes on only after all calls and door commands have been off for `dead_time_s`. That
+   time begins at the first reading after the "off" was written.
 LIFT-DRIVE-4. A call is held until the car stands at its destination. With `call_pulse_s` a call is a
    pulse. The call is given again after every interruption. The call is also given again if the car had
    arrived and is later seen at another floor. No new call is given during a change of the floor code,

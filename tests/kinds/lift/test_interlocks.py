@@ -25,7 +25,7 @@ def driven(
     """
     shown = []
     for now, wish in wishes:
-        relays = relays.step(wish, now, rules)
+        relays = relays.step(wish, now, rules).confirm(now)
         on = relays.outputs()
         side = on.hold_door.value if on.hold_door else ""
         shown.append(" ".join(filter(None, ("A" if on.agv_request else "", on.call, side))))
@@ -53,6 +53,37 @@ def test_relays_rest_between_a_call_and_a_door_command() -> None:
               (2.0, hold()), (2.2, hold()), (2.3, hold())]  # fmt: skip
     assert driven(Relays(), wishes, limits(min_off_s=0)) == [
         "A front", "A", "A", "A L1", "A", "A", "A front"]  # fmt: skip
+
+
+class BadWire(Controller):
+    """A lift whose first write of a call's "off" takes `slow_s`, or fails for `lost_s`."""
+
+    slow_s = 0.0
+    lost_s = 0.0
+    since: float | None = None
+    story: Story
+
+    def write(self, outputs: LiftOutputs) -> None:
+        if self.driven.call and not outputs.call and self.since is None:
+            self.since = self.now
+            self.story.now += self.slow_s
+            self.now = self.story.now
+        lost = self.since is not None and self.now < self.since + self.lost_s
+        self.unwritable = "no reply" if lost else ""
+        super().write(outputs)
+
+
+@pytest.mark.parametrize(("slow_s", "lost_s"), [(0.0, 0.0), (0.45, 0.0), (0.0, 0.45)])
+def test_relays_rest_from_the_time_when_the_off_was_written(slow_s: float, lost_s: float) -> None:
+    wire = BadWire()
+    wire.slow_s, wire.lost_s = slow_s, lost_s
+    wire.story = story = Story(wire)
+    story.run(1.0)
+    story.asks("A", "L2")
+    story.until(lambda: story.outputs.hold_door)
+    (off_at, _, off), (on_at, _, on) = story.edges[-2:]
+    assert (off, on) == (None, "front")
+    assert 0.29 < on_at - off_at < 0.36
 
 
 def test_two_doors_are_never_held_together_and_relays_rest_between_them() -> None:
@@ -94,7 +125,7 @@ def test_the_core_wakes_when_relays_have_rested() -> None:
     relays = Relays()
     for now, wish in ((0.0, call("L1")), (1.0, call("L2")), (3.0, call("L2")), (4.0, hold())):
         assert relays.changes_at(wish, now, rules) > now
-        relays = relays.step(wish, now, rules)
+        relays = relays.step(wish, now, rules).confirm(now)
     assert relays.changes_at(hold(), 4.0, rules) == 4.3
     assert relays.changes_at(call("L1"), 4.0, rules) == 60.0
     assert relays.changes_at(LiftOutputs(), 4.0, rules) == float("inf")

@@ -219,7 +219,7 @@ def test_the_core_wakes_at_the_end_of_a_wait_for_the_lift() -> None:
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
     alone(0.0, CLOSED)(1.0, ASKED)
     assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
-    assert alone.decision.wake_at == 5.0
+    assert alone(1.0, CLOSED).decision.wake_at == 5.0
 
 
 def test_agv_mode_that_is_lost_on_the_way_is_requested_again() -> None:
@@ -308,10 +308,10 @@ def test_if_rmf_is_silent_with_a_robot_inside_the_outputs_stay_on_with_a_warning
 
 
 def test_the_core_wakes_for_a_silence_of_rmf_and_for_the_next_try() -> None:
-    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
+    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED, AT_L1)
     assert alone.decision.wake_at == 31.0
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
-    alone(0.0, CLOSED)(1.0, ASKED)(5.0, CLOSED)
+    alone(0.0, CLOSED)(1.0, ASKED)(5.0, CLOSED, CLOSED)
     assert alone.decision.outputs == LiftOutputs()
     assert alone.decision.wake_at == 15.0
 
