@@ -165,7 +165,7 @@ def _drive(
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
         session = drive.advance(session, view, relays, now, limits)
-        outputs = drive.wanted(session, view, now, limits)
+        outputs = drive.wanted(session, view, relays, now, limits)
     elif session:
         session = drive.paused(session)
     elif grace and now >= grace.until:
@@ -173,7 +173,7 @@ def _drive(
     elif grace and allowed:
         outputs = drive.stays_on(grace, relays, view, now, limits)
     relays = relays.step(outputs, now, limits.t)
-    if session and relays.call.on and session.call_at is None:
+    if session and relays.call.on and relays.call.written and session.call_at is None:
         session = replace(session, call_at=now)
     return replace(memory, session=session, grace=grace, relays=relays), outputs
 

@@ -17,9 +17,10 @@ LIFT-DRIVE-3. A call is given only if the car is not at the destination, and onl
    door command comes on only after all calls and door commands have been off for `dead_time_s`. That
    time begins at the first reading after the "off" was written.
 LIFT-DRIVE-4. A call is held until the car stands at its destination. With `call_pulse_s` a call is a
-   pulse. The call is given again after every interruption. The call is also given again if the car had
-   arrived and is later seen at another floor. No new call is given during a change of the floor code,
-   because the car may be arriving at that moment.
+   pulse. The pulse begins at the first reading after the call was written. The call is given again
+   after every interruption. The call is also given again if the car had arrived and is later seen at
+   another floor. No new call is given during a change of the floor code, because the car may be
+   arriving at that moment.
 LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. When a timeout ends, the
    outputs go off and a fault is shown. Three retries follow, after 10, 30 and 60 s. If the last retry
    fails, the fault latches, which means that only an operator can clear it. If AGV mode ends during the
@@ -117,8 +118,13 @@ def advance(
     return session
 
 
-def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLimits) -> LiftOutputs:
-    """Choose the outputs for a session that may have outputs (`serves`)."""
+def wanted(
+    session: LiftSession, view: BelievedLift, relays: Relays, now: float, limits: LiftLimits
+) -> LiftOutputs:
+    """Choose the outputs for a session that may have outputs (`serves`).
+
+    `relays`: the state of the relays before this scan.
+    """
     if session.retry_at is not None:
         return LiftOutputs()
     if not (agv_ok(view) or limits.by_call):
@@ -127,7 +133,7 @@ def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLim
     if agv_ok(view) and at_destination(session, view, limits):
         return LiftOutputs(agv_request=True, hold_door=stop.side)
     may_call = not session.arrived and now < _pulse_ends_at(session, limits)
-    is_new_call = session.call_at is None
+    is_new_call = session.call_at is None and relays.call.on != stop.level
     if not may_call or Hazard.OVERLOAD in view.hazards or (is_new_call and view.level_settles):
         return LiftOutputs(agv_request=True)
     return LiftOutputs(agv_request=True, call=stop.level)
@@ -163,7 +169,8 @@ def next_at(session: LiftSession, limits: LiftLimits) -> tuple[float, ...]:
 def _requested(session: LiftSession, relays: Relays, limits: LiftLimits) -> bool:
     """Return whether our outputs requested AGV mode before this scan."""
     if limits.by_call:
-        return session.call_at is not None or relays.hold.on is not None
+        called = session.call_at is not None or relays.call.on is not None
+        return called or relays.hold.on is not None
     return bool(relays.agv.on)
 
 

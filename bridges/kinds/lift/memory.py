@@ -150,12 +150,12 @@ class LiftSession(msgspec.Struct, frozen=True):
 
     `boarded`: OPEN at the destination has been published for this session, so a robot may be inside.
     `agv_seen`: AGV mode has come on at our request. `arrived`: the car has stood at the destination.
-    `call_at`: the start of the present call. `waiting`: the step for which the ride waits. `since`: the
-    start of that wait. `tries`: how often that step has failed. `retry_at`: the outputs stay off until
-    this time; inf means that the fault has latched. `forgotten`: the mark of a session that RMF's
-    supervisor has forgotten or ended. `robot`: the messages of the robot's own adapter. `doubted`: a
-    destination that does not count yet. `ends`: the stamps that show whether an END is older than the
-    session.
+    `call_at`: the start of the present call, which is the first reading after the call was written.
+    `waiting`: the step for which the ride waits. `since`: the start of that wait. `tries`: how often
+    that step has failed. `retry_at`: the outputs stay off until this time; inf means that the fault has
+    latched. `forgotten`: the mark of a session that RMF's supervisor has forgotten or ended. `robot`:
+    the messages of the robot's own adapter. `doubted`: a destination that does not count yet. `ends`:
+    the stamps that show whether an END is older than the session.
     """
 
     id: str

@@ -56,15 +56,19 @@ def test_relays_rest_between_a_call_and_a_door_command() -> None:
 
 
 class BadWire(Controller):
-    """A lift whose first write of a call's "off" takes `slow_s`, or fails for `lost_s`."""
+    """A lift at which one switching of the call takes `slow_s`, or fails for `lost_s`. `call` is that
+    switching: a landing, or None for "off"."""
 
-    slow_s = 0.0
-    lost_s = 0.0
     since: float | None = None
     story: Story
 
+    def __init__(self, call: str | None, slow_s: float, lost_s: float) -> None:
+        super().__init__()
+        self.bad_call, self.slow_s, self.lost_s = call, slow_s, lost_s
+
     def write(self, outputs: LiftOutputs) -> None:
-        if self.driven.call and not outputs.call and self.since is None:
+        switches = outputs.call != self.driven.call
+        if switches and outputs.call == self.bad_call and self.since is None:
             self.since = self.now
             self.story.now += self.slow_s
             self.now = self.story.now
@@ -75,8 +79,7 @@ class BadWire(Controller):
 
 @pytest.mark.parametrize(("slow_s", "lost_s"), [(0.0, 0.0), (0.45, 0.0), (0.0, 0.45)])
 def test_relays_rest_from_the_time_when_the_off_was_written(slow_s: float, lost_s: float) -> None:
-    wire = BadWire()
-    wire.slow_s, wire.lost_s = slow_s, lost_s
+    wire = BadWire(None, slow_s, lost_s)
     wire.story = story = Story(wire)
     story.run(1.0)
     story.asks("A", "L2")
@@ -84,6 +87,32 @@ def test_relays_rest_from_the_time_when_the_off_was_written(slow_s: float, lost_
     (off_at, _, off), (on_at, _, on) = story.edges[-2:]
     assert (off, on) == (None, "front")
     assert 0.29 < on_at - off_at < 0.36
+
+
+# ---- LIFT-DRIVE-4: the length of a call's pulse
+
+
+@pytest.mark.parametrize(("slow_s", "lost_s"), [(0.0, 0.0), (0.45, 0.0), (0.0, 0.45), (0.0, 0.7)])
+def test_a_pulse_lasts_from_the_time_when_it_was_written(slow_s: float, lost_s: float) -> None:
+    wire = BadWire("L2", slow_s, lost_s)
+    wire.story = story = Story(wire, call_pulse_s=0.5)
+    story.run(1.0)
+    story.asks("A", "L2")
+    story.run(10.0)
+    (on_at, *on), (off_at, *off) = story.edges[1:3]
+    assert (on, off) == (["call", "L2"], ["call", None])
+    assert 0.49 < off_at - on_at < 0.56
+    assert story.state == "AGV, open at L2, A to L2"
+
+
+def test_a_call_stays_on_when_the_car_leaves_before_the_call_is_known_to_be_written() -> None:
+    building = Building(replace(AT_L1, door=DoorReading.CLOSED))
+    story = Story(building, call_pulse_s=0.5)
+    story.run(1.0)
+    story.asks("A", "L3")
+    building.set(level=None, motion=Motion.UP)
+    story.run(2.0)
+    assert story.edges[1:] == [(1.0, "call", "L3"), (1.5, "call", None)]
 
 
 def test_two_doors_are_never_held_together_and_relays_rest_between_them() -> None:
