@@ -39,9 +39,10 @@ LIFT-5. The report says OPEN when fresh inputs show that the car stands at a kno
      board a lift in a fire.
    - After that OPEN a robot may be inside. To get out, the robot must see the door's true state in any
      mode.
-   - A door is not shown OPEN if its hold is wanted but the relay must rest first. Such a door may close
-     by itself while a robot drives through. The same is true while the session waits for AGV mode or
-     for its next try (LIFT-DRIVE-5), unless there is an obstacle or AGV mode has failed.
+   - A door is not shown OPEN if its hold is wanted but the relay must rest first, or if the hold could
+     not be written yet. Such a door may close by itself while a robot drives through. The same is true
+     while the session waits for AGV mode or for its next try (LIFT-DRIVE-5), unless there is an
+     obstacle or AGV mode has failed.
    - An open door that nobody holds is not shown OPEN under two conditions: the robot itself last
      requested this floor, and the session is about to send the car away. The reason is that RMF's
      supervisor may be repeating a request of an earlier ride. The robot would then drive in.

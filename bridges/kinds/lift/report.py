@@ -83,7 +83,7 @@ def report(
     fulfilled = shown.open_at and shown.open_at == destination
     if session is None or (fulfilled and session.doubted is None):
         return shown
-    return replace(shown, waits=_waits(session, relays, view, wanted, faults, now, limits))
+    return replace(shown, waits=_waits(session, memory, view, wanted, faults, now, limits))
 
 
 def _floor(session: LiftSession | None, view: BelievedLift, limits: LiftLimits) -> str:
@@ -104,7 +104,7 @@ def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -
 
 def _waits(
     session: LiftSession,
-    relays: Relays,
+    memory: LiftMemory,
     view: BelievedLift,
     wanted: LiftOutputs,
     faults: tuple[Fault, ...],
@@ -121,7 +121,9 @@ def _waits(
         return f"for its inputs: {view.blind}"
     if wanted == LiftOutputs() and drive.silent(session, now, limits):
         return f"for a request of {session.id}"
-    if output := relays.resting(wanted, now, limits.t)[0]:
+    if wanted != LiftOutputs() and memory.unwritten_since is not None:
+        return f"for its outputs to be written: {memory.io_fault}"
+    if output := memory.relays.resting(wanted, now, limits.t)[0]:
         return f"for {output}: its relay must rest"
     if wanted.agv_request and session.waiting:
         at = f" at {session.destination}"
@@ -142,8 +144,8 @@ def _may_enter(
 ) -> bool:
     """Return whether an open door may be shown as OPEN. A robot that sees OPEN drives through.
 
-    - The door is not shown OPEN if the hold is wanted and its relay must rest. Nothing holds such a
-      door, so it would close on the robot.
+    - The door is not shown OPEN if the hold is wanted and its relay must rest, or if the write of the
+      hold has failed. Nothing holds such a door, so it would close on the robot.
     - The door is not shown OPEN if the lift is about to send the car away from the floor that the
       session's robot itself last requested. RMF's supervisor may be repeating a request of an earlier
       ride.
@@ -154,7 +156,8 @@ def _may_enter(
     - Before a robot has boarded, OPEN is shown only if the lift serves the session in AGV mode, without
       a fault. The faults FORGOTTEN_BY_SUPERVISOR and NOT_KEPT (a full disk) do not matter.
     """
-    session, held = memory.session, memory.relays.hold.on is not None
+    session, hold = memory.session, memory.relays.hold
+    held = hold.on is not None and (hold.written or memory.unwritten_since is None)
     if wanted.hold_door is not None and not held:
         return False
     if session is None:
