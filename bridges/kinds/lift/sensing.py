@@ -4,7 +4,9 @@ Rules:
 LIFT-SENSING-1. A change of an input counts when it has lasted for the signal's debounce. The end of a
    hazard counts when it has lasted for `hazard_clear_s`. All inputs are unknown until every input has
    settled once. At the start this is no fault. Later, an input may keep changing and not settle within
-   its debounce and `RESTLESS_S`. All inputs are then unknown again.
+   its debounce and `RESTLESS_S`. All inputs are then unknown again. While the motion lines say that the
+   car moves, a floor code that keeps changing makes only the floor unknown, because slow readings of a
+   fast car show another floor each time.
 LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown, because the car may be
    anywhere. After a shorter gap the values stay, and a running debounce starts again. Only the debounce
    of a hazard's begin goes on, so that a bus that fails again and again hides no hazard.
@@ -31,7 +33,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift.memory import CarPosition, LiftLimits, LiftSenses
 from bridges.kinds.lift.signals import DoorReading, Hazard, LiftSample, Motion, Side
-from bridges.kinds.shared.debounce import Settled, forget, settle
+from bridges.kinds.shared.debounce import RESTLESS_S, Settled, forget, settle
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 
@@ -156,18 +158,18 @@ def look(senses: LiftSenses, now: float, limits: LiftLimits) -> BelievedLift:
     motion = senses.motion.value if senses.motion else None
     front = _door(senses.doors[0], now, limits)
     rear = _door(senses.doors[1], now, limits) if _wired(senses.doors[1]) else None
-    code = senses.code.value if senses.code else None
     hazards = frozenset(h for h, s in senses.hazards.items() if s.value)
     unsettled = tuple(_unsettled(senses, limits))
     torn = any(now >= wait.torn_at for wait in unsettled)
     due = [stale_at(senses, limits), front.settles_at, rear.settles_at if rear else NEVER]
+    due.append(_code_torn_at(senses, limits))
     for wait in unsettled:
         due += [wait.due_at, wait.torn_at]
     return BelievedLift(
         blind=_blind(senses, unsettled, now, limits),
         settling=any(wait.new for wait in unsettled) and not torn,
         restless=torn and not stale,
-        level=code[0] if code and code[0] == senses.position.trusted else None,
+        level=_level(senses, now, limits),
         level_settles=senses.code is not None and senses.code.candidate != senses.code.value,
         stopped=_stands(senses.motion),
         motion=motion,
@@ -239,12 +241,33 @@ def _can_have_come(
     return since - before.seen_at >= skipped * limits.t.floor_travel_min_s
 
 
+def _level(senses: LiftSenses, now: float, limits: LiftLimits) -> str | None:
+    """Return the landing, as far as the floor code is believed; None if it is not."""
+    code = senses.code.value if senses.code else None
+    if code is None or code[0] != senses.position.trusted or now >= _code_torn_at(senses, limits):
+        return None
+    return code[0]
+
+
+def _code_torn_at(senses: LiftSenses, limits: LiftLimits) -> float:
+    """Return the time (s) when the floor code counts as restless."""
+    return NEVER if senses.code is None else senses.code.restless_at(limits.debounce_s("floor"))
+
+
 def _stands(motion: Settled[Motion | None] | None) -> bool:
     """Return whether the car stands. If the motion lines have not settled yet, the first reading
     decides."""
     if motion is None:
         return False
     return (motion.candidate if motion.value is None else motion.value) in (None, Motion.STOPPED)
+
+
+def _stands_since(motion: Settled[Motion | None] | None) -> float:
+    """Return the time since which the motion lines do not say that the car moves; NEVER while it
+    moves."""
+    if motion is None or motion.value_since is None:
+        return AGES_AGO
+    return NEVER if motion.value in (Motion.UP, Motion.DOWN, Motion.MOVING) else motion.value_since
 
 
 def _wired(seen: Settled[DoorReading | None] | None) -> bool:
@@ -292,7 +315,11 @@ def _unsettled(senses: LiftSenses, limits: LiftLimits) -> Iterator[Unsettled]:
     ]
     for name, seen in plain:
         if seen is None or seen.torn_since is not None:
-            yield _wait(name, seen, hold(name), hold(name))
+            wait = _wait(name, seen, hold(name), hold(name))
+            if name == "floor" and not wait.new:
+                torn_at = _stands_since(senses.motion) + hold(name) + RESTLESS_S
+                wait = replace(wait, torn_at=max(wait.torn_at, torn_at))
+            yield wait
     for h in HAZARDS:
         fear = senses.hazards.get(h)
         if fear is None or fear.torn_since is not None:
