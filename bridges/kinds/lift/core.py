@@ -39,9 +39,10 @@ LIFT-5. The report says OPEN when fresh inputs show that the car stands at a kno
      board a lift in a fire.
    - After that OPEN a robot may be inside. To get out, the robot must see the door's true state in any
      mode.
-   - A door is not shown OPEN if its hold is wanted but the relay must rest first. Such a door may close
-     by itself while a robot drives through. The same is true while the session waits for AGV mode or
-     for its next try (LIFT-DRIVE-5), unless there is an obstacle or AGV mode has failed.
+   - A door is not shown OPEN if its hold is wanted but the relay must rest first, or if the hold could
+     not be written yet. Such a door may close by itself while a robot drives through. The same is true
+     while the session waits for AGV mode or for its next try (LIFT-DRIVE-5), unless there is an
+     obstacle or AGV mode has failed.
    - An open door that nobody holds is not shown OPEN under two conditions: the robot itself last
      requested this floor, and the session is about to send the car away. The reason is that RMF's
      supervisor may be repeating a request of an earlier ride. The robot would then drive in.
@@ -165,7 +166,7 @@ def _drive(
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
         session = drive.advance(session, view, relays, now, limits)
-        outputs = drive.wanted(session, view, now, limits)
+        outputs = drive.wanted(session, view, relays, now, limits)
     elif session:
         session = drive.paused(session)
     elif grace and now >= grace.until:
@@ -173,7 +174,7 @@ def _drive(
     elif grace and allowed:
         outputs = drive.stays_on(grace, relays, view, now, limits)
     relays = relays.step(outputs, now, limits.t)
-    if session and relays.call.on and session.call_at is None:
+    if session and relays.call.on and relays.call.written and session.call_at is None:
         session = replace(session, call_at=now)
     return replace(memory, session=session, grace=grace, relays=relays), outputs
 
@@ -209,8 +210,10 @@ def _take(
 def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits) -> LiftMemory:
     """Add a reading to the memory. If no write has failed since the last reading, note that the outputs
     were written."""
+    relays = memory.relays if memory.write_failed else memory.relays.confirm(now)
     return replace(
         memory,
+        relays=relays,
         senses=take(memory.senses, sample, now, limits),
         io_fault=memory.io_fault if memory.write_failed else "",
         unwritten_since=memory.unwritten_since if memory.write_failed else None,
@@ -297,6 +300,7 @@ def _wake_at(
     due = [
         view.changes_at,
         memory.relays.changes_at(outputs, now, limits.t),
+        memory.relays.read_at(),
         _unwritten_at(memory, limits),
     ]
     if memory.session:

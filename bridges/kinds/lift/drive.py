@@ -14,11 +14,13 @@ LIFT-DRIVE-2. AGV mode comes first, then the call to the destination. The door's
 LIFT-DRIVE-3. A call is given only if the car is not at the destination, and only without overload.
    Except with `by_call`, a call also needs AGV mode. A door command is given only in AGV mode, when the
    car stands at the destination's landing. A call and a door command are never on together. A call or a
-   door command comes on only after all calls and door commands have been off for `dead_time_s`.
+   door command comes on only after all calls and door commands have been off for `dead_time_s`. That
+   time begins at the first reading after the "off" was written.
 LIFT-DRIVE-4. A call is held until the car stands at its destination. With `call_pulse_s` a call is a
-   pulse. The call is given again after every interruption. The call is also given again if the car had
-   arrived and is later seen at another floor. No new call is given during a change of the floor code,
-   because the car may be arriving at that moment.
+   pulse. The pulse begins at the first reading after the call was written. The call is given again
+   after every interruption. The call is also given again if the car had arrived and is later seen at
+   another floor. No new call is given during a change of the floor code, because the car may be
+   arriving at that moment.
 LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. When a timeout ends, the
    outputs go off and a fault is shown. Three retries follow, after 10, 30 and 60 s. If the last retry
    fails, the fault latches, which means that only an operator can clear it. If AGV mode ends during the
@@ -51,7 +53,8 @@ def is_not_seen_to_stand(session: LiftSession, view: BelievedLift, limits: LiftL
 
 
 def _shows_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
-    return view.level == limits.stops[session.destination].level
+    stop = limits.stops.get(session.destination)  # a session in HUMAN mode may have no destination
+    return stop is not None and view.level == stop.level
 
 
 def agv_ok(view: BelievedLift) -> bool:
@@ -115,8 +118,13 @@ def advance(
     return session
 
 
-def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLimits) -> LiftOutputs:
-    """Choose the outputs for a session that may have outputs (`serves`)."""
+def wanted(
+    session: LiftSession, view: BelievedLift, relays: Relays, now: float, limits: LiftLimits
+) -> LiftOutputs:
+    """Choose the outputs for a session that may have outputs (`serves`).
+
+    `relays`: the state of the relays before this scan.
+    """
     if session.retry_at is not None:
         return LiftOutputs()
     if not (agv_ok(view) or limits.by_call):
@@ -125,7 +133,7 @@ def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLim
     if agv_ok(view) and at_destination(session, view, limits):
         return LiftOutputs(agv_request=True, hold_door=stop.side)
     may_call = not session.arrived and now < _pulse_ends_at(session, limits)
-    is_new_call = session.call_at is None
+    is_new_call = session.call_at is None and relays.call.on != stop.level
     if not may_call or Hazard.OVERLOAD in view.hazards or (is_new_call and view.level_settles):
         return LiftOutputs(agv_request=True)
     return LiftOutputs(agv_request=True, call=stop.level)
@@ -161,7 +169,8 @@ def next_at(session: LiftSession, limits: LiftLimits) -> tuple[float, ...]:
 def _requested(session: LiftSession, relays: Relays, limits: LiftLimits) -> bool:
     """Return whether our outputs requested AGV mode before this scan."""
     if limits.by_call:
-        return session.call_at is not None or relays.hold.on is not None
+        called = session.call_at is not None or relays.call.on is not None
+        return called or relays.hold.on is not None
     return bool(relays.agv.on)
 
 

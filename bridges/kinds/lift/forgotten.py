@@ -20,9 +20,10 @@ Rules:
    or disowned. They then count as if the supervisor had passed them on: they set mode and destination,
    and show that RMF is alive. A request on `adapter_lift_requests` grants no session. But during the
    grace after END it restores the session of a robot that may be inside.
-4. A request counts if its stamp is newer than the requester's last stamp. The END of a forgotten robot
-   counts only when it is heard twice, with no newer request between. Jazzy's fleet adapters send END
-   without a stamp; such an END is never too old.
+4. A request counts if its stamp is newer than the requester's last stamp. Older stamps count too when
+   they have risen for REPLAY_S (FRESHNESS-5), because the clock of the robot's adapter may have been
+   set back. The END of a forgotten robot counts only when it is heard twice, with no newer request
+   between. Jazzy's fleet adapters send END without a stamp; such an END is never too old.
 5. A robot may be left in the car in two cases: its session ended before OPEN was shown at its
    destination, or its adapter was silent before the END. A killed fleet adapter sends END when it is
    back. Until IN_CAR_S after the robot's last message nobody else gets the lift, and the robot's own
@@ -142,16 +143,19 @@ def heard(
 ) -> tuple[LiftSession, bool]:
     """Note one of the robot's own requests. Also return whether this request must be obeyed."""
     ends, robot = isinstance(asked, EndRequested), session.robot
-    newer = asked.stamp > robot.stamp or (ends and asked.stamp == 0)
-    if not newer:
-        return session, False
-    stamp = max(robot.stamp, asked.stamp)
+    clock, counts = robot.clock, True
+    if asked.stamp or not ends:
+        clock, counts = clock.hears(asked.stamp / SECOND_NS, 0.0, now, Rules())
+    robot = replace(robot, clock=clock)
+    if not counts:
+        return replace(session, robot=robot), False
+    stamp = asked.stamp or robot.stamp
     if isinstance(asked, EndRequested):
         ended_at = now if robot.ended_at <= robot.asked_at else robot.ended_at
         robot = replace(robot, stamp=stamp, ended_at=ended_at)
     else:
         opened = robot.opened and asked.destination == robot.floor
-        robot = OwnWords(stamp, now, robot.ended_at, asked.destination, opened, told=opened)
+        robot = OwnWords(stamp, now, robot.ended_at, asked.destination, opened, opened, clock)
     session = replace(session, robot=robot)
     forgotten = session.forgotten
     if forgotten is None:

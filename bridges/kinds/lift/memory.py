@@ -1,7 +1,7 @@
 """The values that the lift core keeps from one scan to the next, and the settings that it needs (its
 limits)."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Literal
 
@@ -60,12 +60,14 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         """Count the landings between these two landings."""
         return abs(self.levels[level] - self.levels[other]) - 1
 
-    def floor_name(self, level: str, preferred: str) -> str:
+    def floor_name(self, level: str, preferred: str, opened: Collection[Side] = ()) -> str:
         """Return RMF's name for a landing. A landing may have several names. Return `preferred` if it
-        is one of them, else the first of them."""
-        if preferred in self.stops and self.stops[preferred].level == level:
+        is one of them, else the first of them whose door is one of the `opened` sides, else the first
+        of them."""
+        names = [name for name, stop in self.stops.items() if stop.level == level]
+        if preferred in names:
             return preferred
-        return next(name for name, stop in self.stops.items() if stop.level == level)
+        return next((name for name in names if self.stops[name].side in opened), names[0])
 
     def side(self, floor: str) -> Side:
         """Return the side of the door that serves this floor."""
@@ -75,8 +77,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 class CarPosition(msgspec.Struct, frozen=True):
     """The car's position, as far as the core believes the floor code.
 
-    `trusted`: the last landing that was believed. `seen_at`: the time when the car was last seen at
-    that landing. `suspect`: a landing that the floor code shows, but that the car cannot have reached.
+    `trusted`: the last landing that was believed. `seen_at`: the time of the last reading of that
+    landing. `suspect`: a landing that the floor code shows, but that the car cannot have reached.
     `moved_at`: the time of the last reading in which the car did not stand.
     """
 
@@ -122,7 +124,8 @@ class OwnWords(msgspec.Struct, frozen=True):
     `stamp`: the newest stamp (ns), by the adapter's clock. `asked_at`: the time of the last request for
     the lift. `ended_at`: the time of the first END after that request. `floor`: the destination of that
     request. `opened`: since that request, OPEN has been published at `floor`. `told`: the adapter has
-    sent a request after that OPEN, so it knows of the open door.
+    sent a request after that OPEN, so it knows of the open door. `clock`: the stamps (s) that show
+    whether a stamp older than `stamp` comes from a clock that was set back.
     """
 
     stamp: int = 0
@@ -131,6 +134,7 @@ class OwnWords(msgspec.Struct, frozen=True):
     floor: str = ""
     opened: bool = False
     told: bool = False
+    clock: Requester = Requester()
 
 
 class Doubted(msgspec.Struct, frozen=True):
@@ -146,12 +150,12 @@ class LiftSession(msgspec.Struct, frozen=True):
 
     `boarded`: OPEN at the destination has been published for this session, so a robot may be inside.
     `agv_seen`: AGV mode has come on at our request. `arrived`: the car has stood at the destination.
-    `call_at`: the start of the present call. `waiting`: the step for which the ride waits. `since`: the
-    start of that wait. `tries`: how often that step has failed. `retry_at`: the outputs stay off until
-    this time; inf means that the fault has latched. `forgotten`: the mark of a session that RMF's
-    supervisor has forgotten or ended. `robot`: the messages of the robot's own adapter. `doubted`: a
-    destination that does not count yet. `ends`: the stamps that show whether an END is older than the
-    session.
+    `call_at`: the start of the present call, which is the first reading after the call was written.
+    `waiting`: the step for which the ride waits. `since`: the start of that wait. `tries`: how often
+    that step has failed. `retry_at`: the outputs stay off until this time; inf means that the fault has
+    latched. `forgotten`: the mark of a session that RMF's supervisor has forgotten or ended. `robot`:
+    the messages of the robot's own adapter. `doubted`: a destination that does not count yet. `ends`:
+    the stamps that show whether an END is older than the session.
     """
 
     id: str

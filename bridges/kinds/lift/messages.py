@@ -32,6 +32,9 @@ def accept(request: LiftRequest, settings: LiftSettings) -> LiftRequested | EndR
     END_SESSION without a session (lift_supervisor/Node.cpp). Such an END_SESSION ends nothing. An
     END_SESSION with DOOR_OPEN comes from a person (`rmf-bridge send`, rmf-web), because no node of RMF
     combines these two.
+
+    A request for HUMAN mode needs no floor, because people then call the lift. A floor that is not
+    served becomes "".
     """
     check_length(session_id=request.session_id)
     stamp = _stamp(request)
@@ -45,12 +48,10 @@ def accept(request: LiftRequest, settings: LiftSettings) -> LiftRequested | EndR
         raise RequestRefused("unknown request_type", str(request.request_type))
     if request.door_state not in set(LiftRequestDoor):
         raise RequestRefused("unknown door_state", str(request.door_state))
-    floors = settings.stops()
-    if request.destination_floor not in floors:
-        raise RequestRefused(
-            "floor not served", f"{request.destination_floor!r} is not one of {', '.join(floors)}"
-        )
-    return LiftRequested(request.session_id, agv, request.destination_floor, stamp)
+    floors, floor = settings.stops(), request.destination_floor
+    if agv and floor not in floors:
+        raise RequestRefused("floor not served", f"{floor!r} is not one of {', '.join(floors)}")
+    return LiftRequested(request.session_id, agv, floor if floor in floors else "", stamp)
 
 
 def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter:

@@ -1,6 +1,9 @@
 """The lift's relays from scan to scan. After it was switched off, a relay stays off for a minimum time.
 It is switched on at most a certain number of times per minute. Calls and door commands exclude each
-other. Switching off never waits."""
+other. Switching off never waits.
+
+A decision switches an output, but a bus may be slow or lose the write. Therefore a relay counts as
+switched off only from the first reading after a scan whose write succeeded."""
 
 import math
 from collections.abc import Iterator
@@ -20,22 +23,40 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
     """One output, or a group of outputs of which at most one is on.
 
     `on`: the output that is on now. `off_at`: the time of the last switching off. `ons`: the latest
-    times of switching on.
+    times of switching on. `written`: False until the last switching has been written.
     """
 
     on: T | None = None
     off_at: float = AGES_AGO
     ons: tuple[float, ...] = ()
+    written: bool = True
 
     def step(self, wanted: T | None, now: float, ready_at: float, t: LiftDurations) -> "Channel[T]":
         """Return the next state. Switching off is immediate. Switching on waits until the relay has
         been off for long enough, and until `ready_at`. A change to another output of the group waits
         too."""
         if self.on is not None:
-            return self if wanted == self.on else replace(self, on=None, off_at=now)
+            off = replace(self, on=None, off_at=now, written=False)
+            return self if wanted == self.on else off
         if wanted is None or now < self.may_switch_on_at(now, ready_at, t):
             return self
-        return Channel(wanted, self.off_at, (*self.recent(now), now))
+        return Channel(wanted, self.off_at, (*self.recent(now), now), written=False)
+
+    def confirm(self, now: float) -> "Channel[T]":
+        """Return the state after the last switching was written. The rest of a relay begins now."""
+        if self.written:
+            return self
+        return replace(self, off_at=now if self.on is None else self.off_at, written=True)
+
+    @property
+    def switched_at(self) -> float:
+        """The time of the last switching."""
+        return self.off_at if self.on is None else self.ons[-1]
+
+    @property
+    def rests_from(self) -> float:
+        """The time from which the relay rests; NEVER while its switching off is not written."""
+        return self.off_at if self.written or self.on is not None else NEVER
 
     def recent(self, now: float) -> tuple[float, ...]:
         """Return the times of switching on within the last minute."""
@@ -46,7 +67,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
         recent = self.recent(now)
         most = t.max_cycles_per_min
         rested_at = recent[-most] + 60.0 if len(recent) >= most else AGES_AGO
-        return max(self.off_at + t.min_off_s, ready_at, rested_at)
+        return max(self.rests_from + t.min_off_s, ready_at, rested_at)
 
 
 class Relays(msgspec.Struct, frozen=True):
@@ -70,6 +91,16 @@ class Relays(msgspec.Struct, frozen=True):
         hold_ready_at = NEVER if self.call.on or call.on else rested_at
         hold = self.hold.step(wanted.hold_door, now, hold_ready_at, t)
         return Relays(agv, call, hold)
+
+    def confirm(self, now: float) -> "Relays":
+        """Return the relays after every output was written."""
+        return Relays(self.agv.confirm(now), self.call.confirm(now), self.hold.confirm(now))
+
+    def read_at(self) -> float:
+        """Return the time for the reading that confirms the last switching, which is at once."""
+        channels: tuple[Channel[Any], ...] = (self.agv, self.call, self.hold)
+        at = max((one.switched_at for one in channels if not one.written), default=NEVER)
+        return math.nextafter(at, NEVER)
 
     def changes_at(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> float:
         """Return the next time, later than `now`, when a wanted output may come on."""
@@ -104,4 +135,4 @@ class Relays(msgspec.Struct, frozen=True):
 
     def _rested_at(self, t: LiftDurations) -> float:
         """Return the time when the call and the door command have both been off for `dead_time_s`."""
-        return max(self.call.off_at, self.hold.off_at) + t.dead_time_s
+        return max(self.call.rests_from, self.hold.rests_from) + t.dead_time_s

@@ -7,7 +7,7 @@ from bridges.kinds.lift import drive, forgotten
 from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
 from bridges.kinds.lift.relays import Relays
 from bridges.kinds.lift.sensing import BelievedLift
-from bridges.kinds.lift.signals import Hazard, LiftOutputs, Motion
+from bridges.kinds.lift.signals import Hazard, LiftOutputs, Motion, Side
 from bridges.kinds.shared.decision import NOT_KEPT, AlarmInputs, Fault
 from bridges.messages.definitions import LiftDoor, LiftMode, LiftMotion
 
@@ -62,7 +62,7 @@ def report(
     """Report the present state. `wanted`: the outputs that would be on if no relay had to rest."""
     session, relays = memory.session, memory.relays
     destination = session.destination if session else ""
-    floor = limits.floor_name(view.level, destination) if view.fresh and view.level else ""
+    floor = _floor(session, view, limits) if view.fresh and view.level else ""
     mode = _mode(view, faults, relays)
     door, estimated = _door(session, view, floor, limits)
     if door is LiftDoor.DOOR_OPEN and not _may_enter(memory, floor, mode, wanted, faults):
@@ -80,9 +80,19 @@ def report(
         boarded=bool(session and session.boarded),
         alarm=AlarmInputs(frozenset(map(str, limits.alarm_on & view.hazards)), view.fresh),
     )
-    if session is None or (shown.open_at == destination and session.doubted is None):
+    fulfilled = shown.open_at and shown.open_at == destination
+    if session is None or (fulfilled and session.doubted is None):
         return shown
-    return replace(shown, waits=_waits(session, relays, view, wanted, faults, now, limits))
+    return replace(shown, waits=_waits(session, memory, view, wanted, faults, now, limits))
+
+
+def _floor(session: LiftSession | None, view: BelievedLift, limits: LiftLimits) -> str:
+    """Name the car's landing. A landing with two doors has two names. Its name is the session's
+    destination. Without a session it is the floor whose door is open."""
+    assert view.level
+    if session:
+        return limits.floor_name(view.level, session.destination)
+    return limits.floor_name(view.level, "", [side for side in Side if view.door(side).open])
 
 
 def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -> tuple[Fault, ...]:
@@ -94,7 +104,7 @@ def _worn(relays: Relays, wanted: LiftOutputs, now: float, limits: LiftLimits) -
 
 def _waits(
     session: LiftSession,
-    relays: Relays,
+    memory: LiftMemory,
     view: BelievedLift,
     wanted: LiftOutputs,
     faults: tuple[Fault, ...],
@@ -111,7 +121,9 @@ def _waits(
         return f"for its inputs: {view.blind}"
     if wanted == LiftOutputs() and drive.silent(session, now, limits):
         return f"for a request of {session.id}"
-    if output := relays.resting(wanted, now, limits.t)[0]:
+    if wanted != LiftOutputs() and memory.unwritten_since is not None:
+        return f"for its outputs to be written: {memory.io_fault}"
+    if output := memory.relays.resting(wanted, now, limits.t)[0]:
         return f"for {output}: its relay must rest"
     if wanted.agv_request and session.waiting:
         at = f" at {session.destination}"
@@ -132,8 +144,8 @@ def _may_enter(
 ) -> bool:
     """Return whether an open door may be shown as OPEN. A robot that sees OPEN drives through.
 
-    - The door is not shown OPEN if the hold is wanted and its relay must rest. Nothing holds such a
-      door, so it would close on the robot.
+    - The door is not shown OPEN if the hold is wanted and its relay must rest, or if the write of the
+      hold has failed. Nothing holds such a door, so it would close on the robot.
     - The door is not shown OPEN if the lift is about to send the car away from the floor that the
       session's robot itself last requested. RMF's supervisor may be repeating a request of an earlier
       ride.
@@ -144,7 +156,8 @@ def _may_enter(
     - Before a robot has boarded, OPEN is shown only if the lift serves the session in AGV mode, without
       a fault. The faults FORGOTTEN_BY_SUPERVISOR and NOT_KEPT (a full disk) do not matter.
     """
-    session, held = memory.session, memory.relays.hold.on is not None
+    session, hold = memory.session, memory.relays.hold
+    held = hold.on is not None and (hold.written or memory.unwritten_since is None)
     if wanted.hold_door is not None and not held:
         return False
     if session is None:

@@ -4,18 +4,24 @@ Rules:
 LIFT-SENSING-1. A change of an input counts when it has lasted for the signal's debounce. The end of a
    hazard counts when it has lasted for `hazard_clear_s`. All inputs are unknown until every input has
    settled once. At the start this is no fault. Later, an input may keep changing and not settle within
-   its debounce and `RESTLESS_S`. All inputs are then unknown again.
+   its debounce and `RESTLESS_S`. All inputs are then unknown again. While the motion lines say that the
+   car moves, a floor code that keeps changing makes only the floor unknown, because slow readings of a
+   fast car show another floor each time.
 LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown, because the car may be
    anywhere. After a shorter gap the values stay, and a running debounce starts again. Only the debounce
    of a hazard's begin goes on, so that a bus that fails again and again hides no hazard.
 LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. The code is
-   rejected if it skips floors faster than a car travels. With motion lines the code is also rejected if
-   it changes while the car stands. After a rejection the position is unknown until the code shows the
-   last trusted floor or another reachable floor, or until an operator resets the lift.
+   rejected if it skips floors faster than a car travels. That time runs from the last reading of the
+   trusted floor to the first reading of the new floor, without any debounce. With motion lines the code
+   is also rejected if it changes while the car stands. After a rejection the position is unknown until
+   the code shows the last trusted floor or another reachable floor, or until an operator resets the
+   lift.
 LIFT-SENSING-4. If the floor code is invalid (`valid_when`) for longer than its debounce, the car may
    move to any floor without being seen. Therefore the next valid floor code is believed.
 LIFT-SENSING-5. A door is open when its contact for the open door says so. If a door has only one
    contact, its other end position is estimated from the door's travel time, and marked as an estimate.
+   The travel begins when the door leaves its contact. A change of the contact that is shorter than its
+   debounce interrupts the estimate, and does not begin the travel anew.
 LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines the car always counts as
    standing.
 """
@@ -27,7 +33,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.lift.memory import CarPosition, LiftLimits, LiftSenses
 from bridges.kinds.lift.signals import DoorReading, Hazard, LiftSample, Motion, Side
-from bridges.kinds.shared.debounce import Settled, forget, settle
+from bridges.kinds.shared.debounce import RESTLESS_S, Settled, forget, settle
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 
@@ -152,18 +158,18 @@ def look(senses: LiftSenses, now: float, limits: LiftLimits) -> BelievedLift:
     motion = senses.motion.value if senses.motion else None
     front = _door(senses.doors[0], now, limits)
     rear = _door(senses.doors[1], now, limits) if _wired(senses.doors[1]) else None
-    code = senses.code.value if senses.code else None
     hazards = frozenset(h for h, s in senses.hazards.items() if s.value)
     unsettled = tuple(_unsettled(senses, limits))
     torn = any(now >= wait.torn_at for wait in unsettled)
     due = [stale_at(senses, limits), front.settles_at, rear.settles_at if rear else NEVER]
+    due.append(_code_torn_at(senses, limits))
     for wait in unsettled:
         due += [wait.due_at, wait.torn_at]
     return BelievedLift(
         blind=_blind(senses, unsettled, now, limits),
         settling=any(wait.new for wait in unsettled) and not torn,
         restless=torn and not stale,
-        level=code[0] if code and code[0] == senses.position.trusted else None,
+        level=_level(senses, now, limits),
         level_settles=senses.code is not None and senses.code.candidate != senses.code.value,
         stopped=_stands(senses.motion),
         motion=motion,
@@ -213,19 +219,39 @@ def _locate(
         return CarPosition(moved_at=before.moved_at)
     if level is None or level == before.suspect:
         return before
-    if level == before.trusted or _can_have_come(before, level, now, limits):
+    if level == before.trusted:
+        here = sample.level == level
+        return replace(before, seen_at=now if here else before.seen_at, suspect=None)
+    if _can_have_come(before, level, code.since, now, limits):
         return replace(before, trusted=level, seen_at=now, suspect=None)
     return replace(before, suspect=level)
 
 
-def _can_have_come(before: CarPosition, level: str, now: float, limits: LiftLimits) -> bool:
+def _can_have_come(
+    before: CarPosition, level: str, since: float, now: float, limits: LiftLimits
+) -> bool:
+    """Return whether the car can have reached this landing, which the floor code has shown since
+    `since`."""
     if before.trusted is None:
         return True
     memory_s = MOTION_MEMORY_S + limits.debounce_s("floor")
     if before.moved_at is None or now - before.moved_at > memory_s:
         return False
     skipped = limits.floors_between(level, before.trusted)
-    return now - before.seen_at >= skipped * limits.t.floor_travel_min_s
+    return since - before.seen_at >= skipped * limits.t.floor_travel_min_s
+
+
+def _level(senses: LiftSenses, now: float, limits: LiftLimits) -> str | None:
+    """Return the landing, as far as the floor code is believed; None if it is not."""
+    code = senses.code.value if senses.code else None
+    if code is None or code[0] != senses.position.trusted or now >= _code_torn_at(senses, limits):
+        return None
+    return code[0]
+
+
+def _code_torn_at(senses: LiftSenses, limits: LiftLimits) -> float:
+    """Return the time (s) when the floor code counts as restless."""
+    return NEVER if senses.code is None else senses.code.restless_at(limits.debounce_s("floor"))
 
 
 def _stands(motion: Settled[Motion | None] | None) -> bool:
@@ -234,6 +260,14 @@ def _stands(motion: Settled[Motion | None] | None) -> bool:
     if motion is None:
         return False
     return (motion.candidate if motion.value is None else motion.value) in (None, Motion.STOPPED)
+
+
+def _stands_since(motion: Settled[Motion | None] | None) -> float:
+    """Return the time since which the motion lines do not say that the car moves; NEVER while it
+    moves."""
+    if motion is None or motion.value_since is None:
+        return AGES_AGO
+    return NEVER if motion.value in (Motion.UP, Motion.DOWN, Motion.MOVING) else motion.value_since
 
 
 def _wired(seen: Settled[DoorReading | None] | None) -> bool:
@@ -246,7 +280,10 @@ def _door(seen: Settled[DoorReading | None] | None, now: float, limits: LiftLimi
         return DoorSeen(open=value is DoorReading.OPEN, closed=value is DoorReading.CLOSED)
     if seen is None or value not in (DoorReading.NOT_OPEN, DoorReading.NOT_CLOSED):
         return DoorSeen(open=False, closed=False)
-    there_at = seen.since + limits.t.door_travel_s
+    since = seen.since
+    if seen.candidate == value and seen.value_since is not None:
+        since = seen.value_since
+    there_at = since + limits.t.door_travel_s
     if now < there_at:
         return DoorSeen(open=False, closed=False, settles_at=there_at)
     return DoorSeen(
@@ -278,7 +315,11 @@ def _unsettled(senses: LiftSenses, limits: LiftLimits) -> Iterator[Unsettled]:
     ]
     for name, seen in plain:
         if seen is None or seen.torn_since is not None:
-            yield _wait(name, seen, hold(name), hold(name))
+            wait = _wait(name, seen, hold(name), hold(name))
+            if name == "floor" and not wait.new:
+                torn_at = _stands_since(senses.motion) + hold(name) + RESTLESS_S
+                wait = replace(wait, torn_at=max(wait.torn_at, torn_at))
+            yield wait
     for h in HAZARDS:
         fear = senses.hazards.get(h)
         if fear is None or fear.torn_since is not None:

@@ -86,7 +86,9 @@ def _come_back(memory: LiftMemory, asked: LiftRequested | EndRequested, now: flo
     if grace.session.id != asked.session_id:
         return memory
     session = forgotten.heard(grace.session, asked, now)[0]
-    if isinstance(asked, EndRequested) or session.robot == grace.session.robot:
+    before, robot = grace.session.robot, session.robot
+    counts = (robot.stamp, robot.asked_at) != (before.stamp, before.asked_at)
+    if isinstance(asked, EndRequested) or not counts:
         return replace(memory, grace=replace(grace, session=session))
     session = _refresh(forgotten.disowned(_anew(session, now), now), asked, now)
     return replace(memory, session=session, grace=None)

@@ -103,7 +103,8 @@ class LiftOutputs(msgspec.Struct, frozen=True):
 class LiftRequested(msgspec.Struct, frozen=True):
     """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and one of its floors.
 
-    `stamp`: the request_time (ns) by the sender's clock; 0 without a time.
+    `destination`: RMF's name of the floor; in HUMAN mode it may be "". `stamp`: the request_time (ns)
+    by the sender's clock; 0 without a time.
     """
 
     session_id: str

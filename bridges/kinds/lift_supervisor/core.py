@@ -8,7 +8,10 @@ its turn, and is called the holder. `bridges/kinds/shared/freshness.py` rejects 
 Rules:
 LIFT-SUPERVISOR-1. Sessions are served in the order of their first requests. A session leaves the queue
    at its END, or after `silent_after_s` without a request. While the lift is silent this time does not
-   run, because adapters repeat their requests only when the lift's states come.
+   run, because adapters repeat their requests only when the lift's states come. A session also leaves
+   the queue, or loses its turn, if it repeats a request for a floor that the lift does not serve. The
+   lift's states name the floors, so such a request is in the queue only if it came before them, or if
+   the floors have changed. A session that the lift shows stays.
 LIFT-SUPERVISOR-2. The lift's states name the session that has the lift. This session is served before
    the queue if its robot still requests it. If nobody has requested the session for `orphan_after_s`,
    the supervisor ends the session.
@@ -17,7 +20,8 @@ LIFT-SUPERVISOR-3. One session at a time has its turn. Its request is sent when 
    repeated when the adapter has repeated it, because the lift's node would otherwise consider RMF
    silent. The request is never sent while the lift shows another session.
 LIFT-SUPERVISOR-4. Only END ends a turn. Usually the holder sends END, wherever the lift is and in any
-   mode. For a silent holder the supervisor sends END. If the lift never showed the holder's session,
+   mode. For a silent holder the supervisor sends END. It also does so for a holder of a floor that is
+   not served (LIFT-SUPERVISOR-1). If the lift never showed the holder's session,
    the supervisor sends END after `silent_after_s`. Otherwise the supervisor sends END after
    `holder_ttl_s`, if the site has set that time. END is repeated until a later state shows another
    session or none. Only after that is the next session served.
@@ -112,7 +116,7 @@ def _take(
             if refused:
                 return memory, refused
             if isinstance(event, RideEnded):
-                return _end(memory, event, now), ""
+                return _end(memory, event.session, now, event.by_person), ""
             return _ask(memory, event, now)
         case LiftStateHeard():
             return _see(memory, event, now), ""
@@ -148,7 +152,7 @@ def _ask(memory: SupervisedLift, request: RideRequested, now: float) -> tuple[Su
     before = memory.claim(request.session)
     served = memory.shown.floors if memory.shown else ()
     if served and request.target.request_type == AGV and request.target.floor not in served:
-        return _still_there(memory, before, now), "floor not served"
+        return _refuse(memory, before, served, now), "floor not served"
     if before is None and len(memory.claims) == MAX_CLAIMS:
         return memory, "queue full"
     since = before.since if before else now
@@ -158,9 +162,18 @@ def _ask(memory: SupervisedLift, request: RideRequested, now: float) -> tuple[Su
     return replace(_with(memory, before, claim), prompted=memory.prompted or holds), ""
 
 
-def _still_there(memory: SupervisedLift, before: SessionClaim | None, now: float) -> SupervisedLift:
-    """Note that the requester of a refused request is alive."""
-    return memory if before is None else _with(memory, before, replace(before, heard_at=now))
+def _refuse(
+    memory: SupervisedLift, before: SessionClaim | None, served: tuple[str, ...], now: float
+) -> SupervisedLift:
+    """Note that the requester of a refused request is alive. But drop its claim if the lift does not
+    serve the claimed floor either, and does not show its session. The lift would refuse this claim for
+    ever."""
+    if before is None:
+        return memory
+    target, holds = before.target, before.session == memory.session_shown
+    if holds or target.request_type != AGV or target.floor in served:
+        return _with(memory, before, replace(before, heard_at=now))
+    return _end(memory, before.session, now)
 
 
 def _with(
@@ -171,17 +184,18 @@ def _with(
     return replace(memory, claims=tuple(claim if c is before else c for c in memory.claims))
 
 
-def _end(memory: SupervisedLift, ended: RideEnded, now: float) -> SupervisedLift:
+def _end(
+    memory: SupervisedLift, session: str, now: float, by_person: bool = False
+) -> SupervisedLift:
     """Remove the session from the queue. If the session has the lift, or has its turn, send END to the
     lift's node. A person's END takes the place of another END of that session."""
-    session = ended.session
     memory, turn = _without(memory, session), memory.turn
     has_it = session in (memory.session_shown, turn.session if turn else "")
     if not has_it or not memory.may_speak:
         return memory
-    if turn and turn.ends and (turn.by_person or not ended.by_person or turn.session != session):
+    if turn and turn.ends and (turn.by_person or not by_person or turn.session != session):
         return memory
-    return _begin(memory, Turn(session, now, ends=True, by_person=ended.by_person))
+    return _begin(memory, Turn(session, now, ends=True, by_person=by_person))
 
 
 def _without(memory: SupervisedLift, session: str) -> SupervisedLift:

@@ -26,7 +26,8 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     `value`: the accepted value, which counts. `candidate`: the value that has been read since `since`
     (s). It becomes `value` if it lasts. `steady_at`: the time when `value` was last confirmed; None
     before the first confirmation. `torn_since`: the time since which readings have kept changing; None
-    if they are steady.
+    if they are steady. `value_since`: the time of the first reading of `value`. Other readings that did
+    not last do not change this time. None before the first confirmation.
     """
 
     value: T_co | None
@@ -34,6 +35,7 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     since: float
     steady_at: float | None = None
     torn_since: float | None = None
+    value_since: float | None = None
 
     def due_at(self, hold_s: float) -> float:
         """Return the time when the candidate will count if it lasts; inf if it already counts."""
@@ -55,7 +57,9 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
         before = replace(before, candidate=seen, since=now, torn_since=torn_since)
     if before.torn_since is None or now < before.since + hold_s:
         return before
-    return Settled(seen, seen, before.since, steady_at=now)
+    goes_on = seen == before.value and before.value_since is not None
+    value_since = before.value_since if goes_on else before.since
+    return Settled(seen, seen, before.since, steady_at=now, value_since=value_since)
 
 
 S = TypeVar("S", bound="Settled[Any] | None")

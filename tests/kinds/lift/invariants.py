@@ -214,7 +214,8 @@ def a_request_that_waits_has_a_reason(step: Step) -> None:
     assert session is not None or not shown.waits
     worn = "RELAY_RESTS" in {fault.code for fault in shown.faults}
     assert worn <= any(_worn(channel, step) for channel in _relays(step))
-    if shown.waits.endswith("must rest") and not worn:
+    written = all(channel.written for channel in _relays(step))
+    if shown.waits.endswith("must rest") and written and not worn:
         t = step.limits.t
         rested_at = max(channel.off_at for channel in _relays(step)) + max(
             t.min_off_s, t.dead_time_s

@@ -127,11 +127,12 @@ def calls_and_holds(
     alone: Alone, readings: Sequence[tuple[float, LiftSample]]
 ) -> list[tuple[float, str | None, Side | None]]:
     """Return (s, called landing, held door) after each reading. A robot repeats its request at each
-    reading."""
+    reading. Each output is written at once, and the inputs are then read again."""
     shown = []
     for now, reading in readings:
         outputs = alone(now, reading, ASKED).decision.outputs
         shown.append((now, outputs.call, outputs.hold_door))
+        alone(now, reading)
     return shown
 
 

@@ -177,6 +177,30 @@ def test_a_car_may_pass_a_floor_unseen_in_its_least_travel_time() -> None:
     assert (alone.decision.report.floor, alone.faults) == ("L3", ())
 
 
+def test_a_floor_that_is_passed_within_its_debounce_does_not_lose_the_car() -> None:
+    building = Building(OPEN_AT_L1)
+    story = Story(building, debounce={"floor": 0.7})
+    story.run(2.0)
+    building.set(motion=Motion.UP)
+    story.run(3.0)
+    building.set(level="L2")
+    story.run(3.6)
+    building.set(level="L3")
+    story.run(4.0)
+    building.set(motion=Motion.STOPPED)
+    story.run(6.0)
+    assert (story.state, story.faults) == ("AGV, open at L3", [])
+
+
+def test_a_debounce_longer_than_the_travel_makes_no_jump_believable() -> None:
+    building = Building(OPEN_AT_L1)
+    story = Story(building, debounce={"floor": 0.7})
+    story.run(2.0)
+    building.set(level="L3", motion=Motion.UP)
+    story.run(4.0)
+    assert (story.state, story.faults) == ("AGV, moving at ?", ["POSITION_LOST"])
+
+
 # ---- LIFT-SENSING-4: a floor code that is valid only in AGV mode
 
 

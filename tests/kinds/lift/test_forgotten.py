@@ -182,6 +182,30 @@ def test_an_old_request_does_not_count_but_an_end_without_a_stamp_counts() -> No
     assert sessions(lift.story) == ["", A, ""]
 
 
+def test_a_robot_whose_adapters_clock_was_set_back_still_goes_on_asking() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L2")
+    for _ in range(10):
+        lift.adapter(AGV, "L2", at=WALL - 60.0 + lift.story.now)
+        lift.story.run(lift.story.now + 0.8)
+    lift.supervisor_ends()
+    for _ in range(10):
+        lift.adapter(AGV, "L2", at=WALL - 60.0 + lift.story.now)
+        lift.story.run(lift.story.now + 0.8)
+    assert sessions(lift.story) == ["", A]
+    assert lift.story.outputs.hold_door is not None
+
+
+def test_an_older_stamp_that_does_not_rise_is_no_sign_of_a_clock_that_was_set_back() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L2")
+    for _ in range(10):
+        lift.adapter(AGV, "L2", at=WALL - 60.0)
+        lift.story.run(lift.story.now + 0.8)
+    lift.supervisor_ends()
+    assert sessions(lift.story) == ["", A, ""]
+
+
 def test_the_fault_names_the_other_robot_and_no_time_of_silence() -> None:
     lift = Overheard()
     lift.story.asks(B, "L1")

@@ -175,7 +175,7 @@ def test_a_hazard_during_a_ride_cancels_the_call_and_the_ride_resumes_afterwards
 
 def test_a_pulsed_call_is_repeated_after_the_hazard_that_cut_it_short() -> None:
     alone = Alone(stale_after_s=900.0, call_pulse_s=2.0, hazard_clear_s=1.0)
-    alone(0.0, CLOSED)(1.0, LiftRequested("A", True, "L3"))
+    alone(0.0, CLOSED)(1.0, LiftRequested("A", True, "L3"), CLOSED)
     assert alone.decision.outputs.call == "L3"
     alone(2.0, replace(CLOSED, hazards=frozenset({Hazard.EMERGENCY})))
     assert alone.decision.outputs == LiftOutputs()

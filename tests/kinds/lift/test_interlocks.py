@@ -25,7 +25,7 @@ def driven(
     """
     shown = []
     for now, wish in wishes:
-        relays = relays.step(wish, now, rules)
+        relays = relays.step(wish, now, rules).confirm(now)
         on = relays.outputs()
         side = on.hold_door.value if on.hold_door else ""
         shown.append(" ".join(filter(None, ("A" if on.agv_request else "", on.call, side))))
@@ -53,6 +53,66 @@ def test_relays_rest_between_a_call_and_a_door_command() -> None:
               (2.0, hold()), (2.2, hold()), (2.3, hold())]  # fmt: skip
     assert driven(Relays(), wishes, limits(min_off_s=0)) == [
         "A front", "A", "A", "A L1", "A", "A", "A front"]  # fmt: skip
+
+
+class BadWire(Controller):
+    """A lift at which one switching of the call takes `slow_s`, or fails for `lost_s`. `call` is that
+    switching: a landing, or None for "off"."""
+
+    since: float | None = None
+    story: Story
+
+    def __init__(self, call: str | None, slow_s: float, lost_s: float) -> None:
+        super().__init__()
+        self.bad_call, self.slow_s, self.lost_s = call, slow_s, lost_s
+
+    def write(self, outputs: LiftOutputs) -> None:
+        switches = outputs.call != self.driven.call
+        if switches and outputs.call == self.bad_call and self.since is None:
+            self.since = self.now
+            self.story.now += self.slow_s
+            self.now = self.story.now
+        lost = self.since is not None and self.now < self.since + self.lost_s
+        self.unwritable = "no reply" if lost else ""
+        super().write(outputs)
+
+
+@pytest.mark.parametrize(("slow_s", "lost_s"), [(0.0, 0.0), (0.45, 0.0), (0.0, 0.45)])
+def test_relays_rest_from_the_time_when_the_off_was_written(slow_s: float, lost_s: float) -> None:
+    wire = BadWire(None, slow_s, lost_s)
+    wire.story = story = Story(wire)
+    story.run(1.0)
+    story.asks("A", "L2")
+    story.until(lambda: story.outputs.hold_door)
+    (off_at, _, off), (on_at, _, on) = story.edges[-2:]
+    assert (off, on) == (None, "front")
+    assert 0.29 < on_at - off_at < 0.36
+
+
+# ---- LIFT-DRIVE-4: the length of a call's pulse
+
+
+@pytest.mark.parametrize(("slow_s", "lost_s"), [(0.0, 0.0), (0.45, 0.0), (0.0, 0.45), (0.0, 0.7)])
+def test_a_pulse_lasts_from_the_time_when_it_was_written(slow_s: float, lost_s: float) -> None:
+    wire = BadWire("L2", slow_s, lost_s)
+    wire.story = story = Story(wire, call_pulse_s=0.5)
+    story.run(1.0)
+    story.asks("A", "L2")
+    story.run(10.0)
+    (on_at, *on), (off_at, *off) = story.edges[1:3]
+    assert (on, off) == (["call", "L2"], ["call", None])
+    assert 0.49 < off_at - on_at < 0.56
+    assert story.state == "AGV, open at L2, A to L2"
+
+
+def test_a_call_stays_on_when_the_car_leaves_before_the_call_is_known_to_be_written() -> None:
+    building = Building(replace(AT_L1, door=DoorReading.CLOSED))
+    story = Story(building, call_pulse_s=0.5)
+    story.run(1.0)
+    story.asks("A", "L3")
+    building.set(level=None, motion=Motion.UP)
+    story.run(2.0)
+    assert story.edges[1:] == [(1.0, "call", "L3"), (1.5, "call", None)]
 
 
 def test_two_doors_are_never_held_together_and_relays_rest_between_them() -> None:
@@ -94,7 +154,7 @@ def test_the_core_wakes_when_relays_have_rested() -> None:
     relays = Relays()
     for now, wish in ((0.0, call("L1")), (1.0, call("L2")), (3.0, call("L2")), (4.0, hold())):
         assert relays.changes_at(wish, now, rules) > now
-        relays = relays.step(wish, now, rules)
+        relays = relays.step(wish, now, rules).confirm(now)
     assert relays.changes_at(hold(), 4.0, rules) == 4.3
     assert relays.changes_at(call("L1"), 4.0, rules) == 60.0
     assert relays.changes_at(LiftOutputs(), 4.0, rules) == float("inf")

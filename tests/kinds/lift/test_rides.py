@@ -9,7 +9,17 @@ from bridges.kinds.lift.signals import DoorReading, LiftOutputs, LiftSample, Mot
 from bridges.kinds.shared.decision import RequestRefused
 from bridges.messages.definitions import LiftMode, LiftMotion, LiftRequest, LiftState, Time
 from bridges.messages.stamps import in_seconds
-from tests.kinds.lift.story import AGV, END, HUMAN, STANDING, WALL, Building, Controller, Story
+from tests.kinds.lift.story import (
+    AGV,
+    END,
+    HUMAN,
+    STANDING,
+    WALL,
+    Building,
+    Controller,
+    Story,
+    boarding,
+)
 
 SUMMARY = ("mode", "floor", "door", "motion", "session", "boarded", "destination")
 IDLE_AT_L1 = [(0.0, "OFFLINE, moving at ?"), (0.1, "HUMAN, closed at L1")]
@@ -54,20 +64,20 @@ def test_a_robot_rides_up_and_down_and_releases_the_lift() -> None:
         (3.13, "AGV, closed at L2, A to L3"),
         (4.23, "AGV, closed at ?, A to L3"),
         (5.13, "AGV, closed at L3, A to L3"),
-        (5.98, "AGV, moving at L3, A to L3"),
-        (6.93, "AGV, open at L3, A to L3"),
-        (20.03, "AGV, open at L3, A to L1"),
-        (20.13, "AGV, moving at L3, A to L1"),
+        (5.93, "AGV, moving at L3, A to L3"),
+        (7.03, "AGV, open at L3, A to L3"),
+        (20.0, "AGV, open at L3, A to L1"),
+        (20.1, "AGV, moving at L3, A to L1"),
         (21.03, "AGV, closed at L3, A to L1"),
         (21.53, "AGV, closed at ?, A to L1"),
         (22.63, "AGV, closed at L2, A to L1"),
         (23.53, "AGV, closed at ?, A to L1"),
         (24.63, "AGV, closed at L1, A to L1"),
-        (25.38, "AGV, moving at L1, A to L1"),
-        (26.38, "AGV, open at L1, A to L1"),
+        (25.33, "AGV, moving at L1, A to L1"),
+        (26.43, "AGV, open at L1, A to L1"),
         (40.0, "AGV, open at L1"),
-        (42.78, "AGV, moving at L1"),
-        (43.1, "HUMAN, moving at L1"),
+        (42.73, "AGV, moving at L1"),
+        (43.05, "HUMAN, moving at L1"),
         (43.73, "HUMAN, closed at L1"),
     ]
     assert story.motions == [
@@ -202,6 +212,31 @@ def test_human_mode_requested_by_a_stranger_is_a_session_without_outputs() -> No
     story.ends("rmf-web")
     story.asks("A", "L1")
     assert story.outputs == LiftOutputs(agv_request=True)
+
+
+def test_human_mode_needs_no_floor() -> None:
+    story = Story(Controller())
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(5.0)
+    story.asks("A", "", HUMAN)
+    story.run(6.0)
+    assert (story.state, story.outputs) == ("HUMAN, moving at L1, A to ", LiftOutputs())
+    assert story.node.status()["waits"] == "for END: in HUMAN mode people call the lift"
+    story.ends("A")
+    story.run(10.0)
+    story.asks("rmf-web", "L9", HUMAN)
+    story.run(11.0)
+    assert (story.state, story.faults) == ("HUMAN, closed at L1, rmf-web to ", [])
+    assert story.node.refused == {}
+
+
+def test_the_grace_of_a_session_without_a_floor_has_no_outputs() -> None:
+    story = boarding()
+    story.asks("A", "", HUMAN)
+    story.ends("A")
+    story.run(10.0)
+    assert (story.state, story.outputs) == ("AGV, open at L1", LiftOutputs())
 
 
 def test_an_open_door_in_human_mode_is_not_offered_for_boarding() -> None:
@@ -370,11 +405,15 @@ def test_a_door_without_wires_is_never_shown_open() -> None:
     assert story.state == "AGV, moving at L2_rear, A to L2_rear"
 
 
-def test_without_a_session_either_open_door_is_shown() -> None:
+def test_without_a_session_either_open_door_is_shown_at_its_floor() -> None:
     building = Building(replace(at("L2"), rear_door=DoorReading.OPEN))
     story = Story(building, floors=TWO_DOORS)
     story.run(1.0)
+    assert story.state == "AGV, open at L2_rear"
+    building.set(door=DoorReading.OPEN)
+    story.run(1.5)
     assert story.state == "AGV, open at L2"
+    building.set(door=DoorReading.CLOSED)
     building.set(rear_door=DoorReading.BETWEEN)
     story.run(2.0)
     assert story.state == "AGV, moving at L2"
@@ -391,7 +430,7 @@ def test_without_a_session_either_open_door_is_shown() -> None:
         (LiftRequest("Lift1", Time(), "x" * 257, 1, "L1", 2), "impossible session_id"),
         (LiftRequest("Lift1", Time(), "A", 3, "L1", 2), "unknown request_type"),
         (LiftRequest("Lift1", Time(), "A", 1, "L1", 1), "unknown door_state"),
-        (LiftRequest("Lift1", Time(), "A", 2, "", 2), "floor not served"),
+        (LiftRequest("Lift1", Time(), "A", 1, "", 2), "floor not served"),
     ],
 )
 def test_an_impossible_request_to_a_lift_is_refused_by_name(

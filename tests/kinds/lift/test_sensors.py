@@ -324,6 +324,46 @@ def test_an_input_that_never_settles_is_not_believed() -> None:
     assert (story.faults, story.state) == ([], "AGV, open at L1, A to L1")
 
 
+TOWER = [f"L{n}" for n in range(1, 13)]
+
+
+def riding_past_a_floor_in_each_reading() -> Story:
+    """Return a story of a car on its way to L12. It shows each floor for less than the debounce of the
+    floor code. The last reading shows L9."""
+    closed = replace(OPEN_AT_L1, door=DoorReading.CLOSED)
+    story = Story(Building(closed), floors=TOWER, debounce={"floor": 1.0})
+    story.run(2.0)
+    story.asks("A", "L12")
+    story.building.set(motion=Motion.UP)
+    for level in TOWER[1:9]:
+        story.building.set(level=level)
+        story.run(story.now + 0.9)
+    return story
+
+
+def test_a_fast_car_that_is_read_slowly_is_at_an_unknown_floor_but_not_offline() -> None:
+    story = riding_past_a_floor_in_each_reading()
+    assert (story.state, story.faults) == ("AGV, closed at ?, A to L12", [])
+    assert story.outputs == LiftOutputs(agv_request=True, call="L12")
+    story.building.set(level="L12")
+    story.run(story.now + 0.5)
+    story.building.set(motion=Motion.STOPPED)
+    story.run(story.now + 3.0)
+    assert not any("OFFLINE" in state for at, state in story.states if at > 1.5)
+    assert (story.state, story.faults) == ("AGV, closed at L12, A to L12", [])
+    assert len([edge for edge in story.edges if edge[1] == "call"]) == 2
+
+
+def test_a_floor_code_that_keeps_changing_in_a_standing_car_is_not_believed() -> None:
+    story = riding_past_a_floor_in_each_reading()
+    story.building.set(motion=Motion.STOPPED)
+    for level in ("L9", "L8") * 3:
+        story.building.set(level=level)
+        story.run(story.now + 0.9)
+    assert story.state == "OFFLINE, moving at ?, A to L12"
+    assert story.outputs == LiftOutputs()
+
+
 def test_a_fire_loop_that_chatters_takes_the_lift_away() -> None:
     story = boarding()
     for i in range(100):
@@ -408,8 +448,26 @@ def test_with_only_a_closed_contact_an_open_door_is_estimated_and_marked() -> No
     story.building.set(door=DoorReading.NOT_CLOSED)
     story.run(7.0)
     assert story.states[-1][1] == "AGV, open at L1, A to L1"
-    assert story.states[-1][0] == 5.05
+    assert story.states[-1][0] == 5.0
     assert story.node.status()["door"] == "open (estimated)"
+
+
+def test_a_glitch_of_a_single_contact_restarts_no_estimate() -> None:
+    story = Story(
+        Building(replace(OPEN_AT_L1, door=DoorReading.NOT_CLOSED)), debounce={"door": 0.1}
+    )
+    story.run(8.0)
+    story.asks("A", "L1")
+    story.run(9.0)
+    edges = list(story.edges)
+    for _ in range(5):
+        story.building.set(door=DoorReading.CLOSED)
+        story.run(story.now + 0.05)
+        story.building.set(door=DoorReading.NOT_CLOSED)
+        story.run(story.now + 0.2)
+        assert story.state == "AGV, open at L1, A to L1"
+        story.run(story.now + 4.0)
+    assert (story.edges, story.faults) == (edges, [])
 
 
 @pytest.mark.parametrize(

@@ -219,7 +219,7 @@ def test_the_core_wakes_at_the_end_of_a_wait_for_the_lift() -> None:
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
     alone(0.0, CLOSED)(1.0, ASKED)
     assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
-    assert alone.decision.wake_at == 5.0
+    assert alone(1.0, CLOSED).decision.wake_at == 5.0
 
 
 def test_agv_mode_that_is_lost_on_the_way_is_requested_again() -> None:
@@ -308,15 +308,43 @@ def test_if_rmf_is_silent_with_a_robot_inside_the_outputs_stay_on_with_a_warning
 
 
 def test_the_core_wakes_for_a_silence_of_rmf_and_for_the_next_try() -> None:
-    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
+    alone = Alone(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED, AT_L1)
     assert alone.decision.wake_at == 31.0
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
-    alone(0.0, CLOSED)(1.0, ASKED)(5.0, CLOSED)
+    alone(0.0, CLOSED)(1.0, ASKED)(5.0, CLOSED, CLOSED)
     assert alone.decision.outputs == LiftOutputs()
     assert alone.decision.wake_at == 15.0
 
 
-# ---- LIFT-4: outputs that cannot be written
+# ---- LIFT-4, LIFT-5: outputs that cannot be written
+
+
+def test_no_open_is_shown_before_the_hold_is_written() -> None:
+    story = Story(Building(LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)))
+    story.run(1.0)
+    story.building.unwritable = "the gateway refuses the command"
+    story.asks("A", "L1")
+    story.run(1.9)
+    assert story.state == "AGV, moving at L1, A to L1"
+    why = "for its outputs to be written: the gateway refuses the command"
+    assert story.node.status()["waits"] == why
+    story.run(4.0)
+    assert not any("open at L1, A" in state for _, state in story.states)
+    assert story.node.status()["boarded"] == "no"
+    story.building.unwritable = ""
+    story.run(5.0)
+    assert (story.state, story.outputs) == ("AGV, open at L1, A to L1", HELD)
+
+
+def test_a_held_door_stays_shown_open_while_a_write_fails() -> None:
+    story = lift("L1", DoorReading.OPEN, agv=True)
+    story.run(5.0)
+    states = list(story.states)
+    story.building.unwritable = "no reply"
+    story.run(5.5)
+    story.building.unwritable = ""
+    story.run(7.0)
+    assert (story.states, story.outputs) == (states, HELD)
 
 
 def test_outputs_that_cannot_be_written_cause_a_fault_and_all_outputs_off() -> None:

@@ -214,6 +214,7 @@ AGES = {
     "moved_at": 5.0,
     "read_at": 61.0,
     "torn_since": 10.0,
+    "value_since": 10.0,
     "unwritten_since": 61.0,
     "since": 700.0,
 }
@@ -274,6 +275,7 @@ def _settled(seen: Settled[Any] | None, by: float) -> Any:
         since=max(_at(seen.since, by), -10.0),
         steady_at=None if seen.steady_at is None else 0.0,
         torn_since=_at(seen.torn_since, by, "torn_since"),
+        value_since=_at(seen.value_since, by, "value_since"),
     )
 
 
@@ -302,7 +304,13 @@ def _robot(robot: OwnWords, by: float) -> OwnWords:
     heard = robot.asked_at > AGES_AGO
     asked_at = max(_at(robot.asked_at, by), -7.0) if heard else AGES_AGO
     ended_at = round(robot.ended_at + by, 6)
-    return replace(robot, stamp=0, asked_at=asked_at, ended_at=_recent(ended_at, 8.0))
+    return replace(
+        robot,
+        stamp=0,
+        asked_at=asked_at,
+        ended_at=_recent(ended_at, 8.0),
+        clock=Requester(),
+    )
 
 
 def _ends(ends: Requester, by: float) -> Requester:

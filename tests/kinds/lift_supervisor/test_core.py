@@ -137,6 +137,39 @@ def test_a_request_for_an_unserved_floor_is_a_sign_of_life_and_changes_nothing()
     assert desk.faults == []
 
 
+def test_a_claim_for_a_floor_that_is_not_served_blocks_nobody() -> None:
+    desk = Alone()
+    desk.asks("a", "L9")
+    for second in range(1, 5):
+        desk.until(float(second))
+        desk.shows(floors=("L1", "L3"))
+        desk.asks("a", "L9")
+        desk.asks("b", "L3")
+    assert [message for _, message in desk.sent] == [
+        "AGV a L9", "AGV a L9", "END a L1", "AGV b L3", "AGV b L3", "AGV b L3"]  # fmt: skip
+    assert desk.waiting == []
+
+
+def test_a_waiting_claim_for_a_floor_that_is_no_longer_served_leaves_the_queue() -> None:
+    desk = Alone()
+    desk.asks("b")
+    desk.asks("a", "L9")
+    desk.shows("b", "L3", to="L3", open=True, floors=("L1", "L3"))
+    desk.until(1.0)
+    desk.asks("a", "L9")
+    assert (desk.waiting, desk.sent) == ([], [(0.0, "AGV b L3")])
+
+
+def test_a_session_in_the_lift_stays_when_its_floor_is_no_longer_served() -> None:
+    desk = Alone()
+    desk.asks("a", "L9")
+    for second in range(1, 30):
+        desk.until(float(second))
+        desk.shows("a", "L1", to="L9", floors=("L1", "L3"))
+        desk.asks("a", "L9")
+    assert not any("END" in message for _, message in desk.sent)
+
+
 # ---- LIFT-SUPERVISOR-4: END
 
 

@@ -27,11 +27,10 @@ def test_an_incident_of_our_own_has_relays_inputs_and_faults() -> None:
     assert [row for row in rows if row[0] in ("relays", "inputs", "faults")] == [
         ("relays", "agv_request"),
         ("relays", "hold_door"),
-        ("relays", "call"),
+        ("inputs", "level"),
         ("inputs", "door"),
         ("inputs", "agv"),
         ("inputs", "floor_valid"),
-        ("inputs", "level"),
         ("faults", "RMF_SILENT"),
     ]
 
