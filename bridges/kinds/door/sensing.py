@@ -10,7 +10,8 @@ DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown a
    debounce of a hazard's begin goes on, so that a bus that fails again and again hides no hazard. If a
    limit contact does not settle within its debounce and `RESTLESS_S`, the door's position is unknown.
 DOOR-SENSING-3. If the YAML sets `feedback: estimated`, a missing limit contact is estimated from the
-   time for which the relay has been on or off. A failed read or write restarts that time.
+   time for which the relay has been on or off. A failed read or write restarts that time. With pulses
+   DOOR-PULSES-3 holds too.
 DOOR-SENSING-4. If a controller reports that it does not know the door's position (`lost`), the report
    counts at once, without debounce.
 """
@@ -92,8 +93,8 @@ def is_fresh(senses: DoorSenses, now: float, limits: DoorLimits) -> bool:
 def look(
     senses: DoorSenses, held: bool, held_since: float, now: float, limits: DoorLimits
 ) -> BelievedDoor:
-    """Decide which inputs to believe now. The relay has been on (if `held`) or off since
-    `held_since`."""
+    """Decide which inputs to believe now. The relay has been on or in pulses (if `held`), or off, since
+    `held_since`; NEVER if no pulse was written yet."""
     opened, closed = _believed(senses.opened), _believed(senses.closed)
     opened_at, closed_at = _estimates(senses, held, held_since, limits)
     guessed = frozenset(s for s in LIMITS if _unwired(getattr(senses, s)))
