@@ -7,8 +7,9 @@ makes no decision: the door's decision core (`bridges/kinds/door/`) decides.
 
 Some operators need pulses instead of a held relay. A Modbus module may time these pulses itself
 (`flash`). In this case the driver requests each pulse only once, because a second request would prolong
-the pulse. The module ends the pulse. If the reply to a request is lost, the driver waits until the next
-pulse is due. If the hold ends during a pulse, the driver switches the relay off.
+the pulse. The module ends the pulse. If the reply to a request is lost, the driver waits until the core
+begins a new pulse; the lost pulse is then over (DOOR-PULSES-2). If the hold ends during a pulse, the
+driver switches the relay off.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,6 +1,6 @@
 """Doors: a DoorRequest switches a relay or a register, and the door's inputs make a DoorState."""
 
-from bridges.kinds.door import core, memory, messages, report, signals
+from bridges.kinds.door import core, memory, messages, pulses, report, signals
 from bridges.kinds.door.memory import DoorLimits, DoorMemory
 from bridges.kinds.door.report import DoorReport
 from bridges.kinds.door.settings import DoorSettings
@@ -39,6 +39,7 @@ KIND: Kind[
 RECORDED: Recorded = {
     "door.memory.Memory": memory.DoorMemory,
     "door.memory.Senses": memory.DoorSenses,
+    "door.pulses.DoorPulses": pulses.DoorPulses,
     "door.report.DoorReport": report.DoorReport,
     "door.signals.CloseRequested": signals.CloseRequested,
     "door.signals.DoorOutputs": signals.DoorOutputs,

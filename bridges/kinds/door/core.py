@@ -1,6 +1,7 @@
 """The door's decision core: one pure decision for each event.
 
-The hold is the output that opens the door and keeps it open.
+The hold is the output that opens the door and keeps it open. For a door operator that closes the door
+by itself, `pulses.py` gives the hold in pulses.
 
 Rules:
 DOOR-1. An OPEN from any requester switches the hold on until a CLOSE comes (the latch). A repeated OPEN
@@ -45,9 +46,9 @@ from bridges.kinds.door.memory import (
     travel_ends_at,
     unwritten_at,
 )
+from bridges.kinds.door.pulses import advance, changes_at, good_since
 from bridges.kinds.door.report import DoorReport, report
 from bridges.kinds.door.sensing import BelievedDoor, look, miss, released_by_fire, take
-from bridges.kinds.door.settings import Pulse
 from bridges.kinds.door.signals import CloseRequested, DoorOutputs, Event, OpenRequested
 from bridges.kinds.shared.decision import (
     Attended,
@@ -76,8 +77,9 @@ def decide(
     memory, refused = _hear(memory, event, now, limits)
     memory = _let_go(memory, now, limits)
     memory = _hold(memory, _look(memory, now, limits), now, limits)
+    memory = _pulse(memory, event, now, limits)
     view = _look(memory, now, limits)
-    is_on = _pulse_is_on(memory, now, limits.pulse)
+    is_on = memory.pulses is None or memory.pulses.is_on
     return Decision(
         memory=memory,
         outputs=DoorOutputs(memory.held and is_on, between_pulses=memory.held and not is_on),
@@ -153,7 +155,10 @@ def _let_go(memory: DoorMemory, now: float, limits: DoorLimits) -> DoorMemory:
 
 
 def _look(memory: DoorMemory, now: float, limits: DoorLimits) -> BelievedDoor:
-    return look(memory.senses, memory.held, memory.held_since, now, limits)
+    since = memory.held_since
+    if memory.held and limits.pulse is not None:
+        since = good_since(memory.pulses)
+    return look(memory.senses, memory.held, since, now, limits)
 
 
 def _hold(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorMemory:
@@ -190,8 +195,11 @@ def _since(before: float | None, is_so: bool, now: float) -> float | None:
     return now if before is None else before
 
 
-def _pulse_is_on(memory: DoorMemory, now: float, pulse: Pulse | None) -> bool:
-    return pulse is None or (now - memory.held_since) % pulse.every_s < pulse.on_s
+def _pulse(memory: DoorMemory, event: Event, now: float, limits: DoorLimits) -> DoorMemory:
+    if limits.pulse is None or not memory.held:
+        return memory if memory.pulses is None else replace(memory, pulses=None)
+    failed = isinstance(event, IoFailed)
+    return replace(memory, pulses=advance(memory.pulses, failed, now, limits.pulse))
 
 
 def _wakes(
@@ -206,7 +214,5 @@ def _wakes(
     yield too_long_at(memory, limits)
     yield lost_at(memory, limits)
     yield unwritten_at(memory, limits)
-    if memory.held and limits.pulse is not None:
-        phase_s = (now - memory.held_since) % limits.pulse.every_s
-        is_on = phase_s < limits.pulse.on_s
-        yield now - phase_s + (limits.pulse.on_s if is_on else limits.pulse.every_s)
+    if memory.pulses is not None and limits.pulse is not None:
+        yield changes_at(memory.pulses, limits.pulse)

@@ -6,6 +6,7 @@ from typing import Literal
 
 import msgspec
 
+from bridges.kinds.door.pulses import DoorPulses
 from bridges.kinds.door.settings import DoorDurations, DoorSettings, Pulse
 from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
@@ -69,7 +70,8 @@ class DoorMemory(msgspec.Struct, frozen=True):
     `shut_since`: the door has not been fully open since this time. `rival_at`: the time when another
     node for this door was last heard. `unattended_since`: no node has published requests since this
     time. `unwritten_since`: since this time the door was read, but no write has succeeded.
-    `write_failed`: the last scan's write failed.
+    `write_failed`: the last scan's write failed. `pulses`: the pulses of the present hold; None for a
+    door that is not held, or that needs no pulses.
     """
 
     latched_at: float | None = None
@@ -85,6 +87,7 @@ class DoorMemory(msgspec.Struct, frozen=True):
     unattended_since: float | None = None
     unwritten_since: float | None = None
     write_failed: bool = False
+    pulses: DoorPulses | None = None
 
 
 def unwritten_at(memory: DoorMemory, limits: DoorLimits) -> float:

@@ -15,7 +15,7 @@ from bridges.kinds.door.memory import (
     unwritten_at,
 )
 from bridges.kinds.door.sensing import BelievedDoor, released_by_fire
-from bridges.kinds.shared.debounce import RESTLESS_S
+from bridges.kinds.shared.debounce import unsteady
 from bridges.kinds.shared.decision import AlarmInputs, Fault
 from bridges.messages.definitions import DoorModeValue
 
@@ -132,6 +132,8 @@ def _hazards(memory: DoorMemory, view: BelievedDoor, limits: DoorLimits) -> Iter
         done = "held open" if limits.on_fire == "open" else "released"
         is_so = "is" if memory.unwritten_since is None else "must be"
         yield Fault("FIRE_ALARM", f"the door {is_so} {done}")
+    if view.chattering:
+        yield Fault("HAZARD_INPUTS_UNSTEADY", unsteady(view.chattering))
     if memory.closing and memory.held and memory.latched_at is None and view.obstructed:
         yield Fault("DOOR_OBSTRUCTED", "held open after CLOSE while the doorway is not clear")
     if view.errors:
@@ -144,8 +146,7 @@ def _contradictions(
     if view.seen and view.opened and view.closed:
         yield Fault("DOOR_CONTACTS_CONTRADICT", "the door reads open and closed")
     if view.restless:
-        which = " and ".join(view.restless)
-        yield Fault("DOOR_CONTACTS_UNSTEADY", f"{which}: not steady within {RESTLESS_S:g} s")
+        yield Fault("DOOR_CONTACTS_UNSTEADY", unsteady(view.restless))
     if view.lost:
         yield Fault("DOOR_POSITION_UNKNOWN", view.lost)
     if now >= travel_ends_at(memory, limits):

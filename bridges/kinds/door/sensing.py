@@ -9,8 +9,11 @@ DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown a
    may have moved. After a shorter gap the values stay, and a running debounce starts again. Only the
    debounce of a hazard's begin goes on, so that a bus that fails again and again hides no hazard. If a
    limit contact does not settle within its debounce and `RESTLESS_S`, the door's position is unknown.
+   If the input of a hazard does not settle within that time, the hazard is present, because a contact
+   that chatters may show a fire or a person.
 DOOR-SENSING-3. If the YAML sets `feedback: estimated`, a missing limit contact is estimated from the
-   time for which the relay has been on or off. A failed read or write restarts that time.
+   time for which the relay has been on or off. A failed read or write restarts that time. With pulses
+   DOOR-PULSES-3 holds too.
 DOOR-SENSING-4. If a controller reports that it does not know the door's position (`lost`), the report
    counts at once, without debounce.
 """
@@ -22,7 +25,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.door.memory import Contact, DoorLimits, DoorSenses
 from bridges.kinds.door.signals import DoorSample
-from bridges.kinds.shared.debounce import forget, settle
+from bridges.kinds.shared.debounce import fear, forget, settle
 from bridges.kinds.shared.durations import NEVER
 
 SIGNALS = ("opened", "closed", "obstruction", "fire")
@@ -35,8 +38,9 @@ class BelievedDoor(msgspec.Struct, frozen=True):
 
     `fresh`: the last reading is younger than `stale_after_s`. `seen`: the reading is fresh and each
     input has settled, so the door's position is known. `restless`: the limit contacts that have kept
-    changing for too long. `estimated`: the end positions that have no contact. `changes_at`: the next
-    time (s) when these values may change without a reading. `lost`, `errors`: see DoorSample.
+    changing for too long. `chattering`: the same for the inputs of hazards. `estimated`: the end
+    positions that have no contact. `changes_at`: the next time (s) when these values may change without
+    a reading, or when a reading may change them. `lost`, `errors`: see DoorSample.
     """
 
     fresh: bool
@@ -48,6 +52,7 @@ class BelievedDoor(msgspec.Struct, frozen=True):
     estimated: frozenset[str]
     changes_at: float
     restless: tuple[str, ...] = ()
+    chattering: tuple[str, ...] = ()
     lost: str = ""
     errors: tuple[str, ...] = ()
 
@@ -60,7 +65,10 @@ def take(senses: DoorSenses, sample: DoorSample, now: float, limits: DoorLimits)
     for signal in SIGNALS:
         before: Contact | None = getattr(senses, signal)
         seen: bool | None = getattr(sample, signal)
-        contacts[signal] = settle(before, seen, now, _hold_s(before, seen, signal, limits))
+        contact = settle(before, seen, now, _hold_s(before, seen, signal, limits))
+        if signal in HAZARDS:
+            contact = fear(contact, now, limits.debounce.get(signal, 0.0))
+        contacts[signal] = contact
     linked_since = now if senses.linked_since is None else senses.linked_since
     return DoorSenses(
         **contacts,
@@ -92,8 +100,8 @@ def is_fresh(senses: DoorSenses, now: float, limits: DoorLimits) -> bool:
 def look(
     senses: DoorSenses, held: bool, held_since: float, now: float, limits: DoorLimits
 ) -> BelievedDoor:
-    """Decide which inputs to believe now. The relay has been on (if `held`) or off since
-    `held_since`."""
+    """Decide which inputs to believe now. The relay has been on or in pulses (if `held`), or off, since
+    `held_since`; NEVER if no pulse was written yet."""
     opened, closed = _believed(senses.opened), _believed(senses.closed)
     opened_at, closed_at = _estimates(senses, held, held_since, limits)
     guessed = frozenset(s for s in LIMITS if _unwired(getattr(senses, s)))
@@ -109,6 +117,7 @@ def look(
         estimated=guessed,
         changes_at=min(_changes(senses, limits, now, opened_at, closed_at), default=NEVER),
         restless=restless,
+        chattering=tuple(s for s in HAZARDS if now >= _chatters_at(senses, s, limits)),
         lost=senses.lost,
         errors=senses.errors,
     )
@@ -140,6 +149,14 @@ def _restless_at(senses: DoorSenses, signal: str, limits: DoorLimits) -> float:
     return NEVER if contact is None else contact.restless_at(limits.debounce.get(signal, 0.0))
 
 
+def _chatters_at(senses: DoorSenses, signal: str, limits: DoorLimits) -> float:
+    """Return the time when the input of a hazard has kept changing for so long that even the hazard's
+    end would have settled."""
+    contact: Contact | None = getattr(senses, signal)
+    hold_s = max(limits.debounce.get(signal, 0.0), limits.t.hazard_clear_s)
+    return NEVER if contact is None else contact.restless_at(hold_s)
+
+
 def _believed(contact: Contact | None) -> bool:
     return contact is not None and contact.value is True
 
@@ -169,9 +186,10 @@ def _changes(
     senses: DoorSenses, limits: DoorLimits, now: float, *estimates: float
 ) -> Iterator[float]:
     """Yield the times (s) when the reading goes stale, when an estimate is due, and when a contact
-    settles."""
+    settles or counts as restless."""
     stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
-    due = [stale_at, *estimates, *(_restless_at(senses, s, limits) for s in LIMITS)]
+    due = [stale_at, *estimates, *(_restless_at(senses, s, limits) for s in SIGNALS)]
+    due += [_chatters_at(senses, s, limits) for s in HAZARDS]
     for signal in SIGNALS:
         contact: Contact | None = getattr(senses, signal)
         if contact is not None:

@@ -4,6 +4,7 @@ The functions are pure and work on readings. So GPIO pins and polled Modbus inpu
 functions. gpiozero's own debounce is not used, because it drops edges and gpiozero's mock pins lack it.
 """
 
+from collections.abc import Iterable
 from typing import Any, Final, Generic, TypeVar
 
 import msgspec
@@ -15,6 +16,12 @@ RESTLESS_S: Final = 2.0
 """The longest time (s), on top of the debounce, that an input may take to settle. An input that takes
 longer counts as restless, because of a loose wire, interference, or a bus that fails again and
 again."""
+
+
+def unsteady(names: Iterable[str]) -> str:
+    """Return the detail of a fault about these restless inputs."""
+    return f"{' and '.join(names)}: not steady within {RESTLESS_S:g} s"
+
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -60,6 +67,19 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
     goes_on = seen == before.value and before.value_since is not None
     value_since = before.value_since if goes_on else before.since
     return Settled(seen, seen, before.since, steady_at=now, value_since=value_since)
+
+
+def fear(seen: "Settled[T]", now: float, hold_s: float) -> "Settled[T]":
+    """Accept a hazard whose input is restless at this reading. Otherwise a contact that changes faster
+    than its debounce would hide the hazard.
+
+    `hold_s`: the debounce (s) of the hazard's begin. An input that has neither settled nor shows the
+    hazard is left alone: the bus may have failed again and again since the start.
+    """
+    shown = seen.value is False or seen.candidate is True
+    if seen.value is True or not shown or now < seen.restless_at(hold_s):
+        return seen
+    return replace(seen, value=True, steady_at=now)
 
 
 S = TypeVar("S", bound="Settled[Any] | None")

@@ -110,6 +110,72 @@ def test_a_panel_that_fails_at_every_second_reading_hides_no_fire_and_ends_none(
     assert panel.until(panel.now + 2.0).told[-1][1] == ""
 
 
+def chatters(panel: Panel, until: float) -> Panel:
+    """Let the fire contact change at each reading, which is faster than its debounce."""
+    while panel.now < until:
+        panel.on["fire"] = not panel.on["fire"]
+        panel.until(panel.now + STEP_S)
+    return panel
+
+
+def test_a_source_that_chatters_is_an_alarm_and_a_fault_until_it_was_clear() -> None:
+    """ALARM-1: the contact changes from 1.125 s on. It has a debounce of 0.25 s and RESTLESS_S."""
+    panel = chatters(Panel().until(1.0), 6.0)
+    assert panel.report.alarm == AlarmInputs(frozenset({"fire"}), True)
+    assert panel.faults == [
+        "ALARM_SOURCE_ACTIVE: fire",
+        "HAZARD_INPUTS_UNSTEADY: fire: not steady within 2 s",
+    ]
+    panel.on["fire"] = False
+    assert panel.until(9.0).faults == []
+    assert panel.told[2:] == [(3.375, "fire", True, False), (7.0, "", True, False)]
+
+
+def test_the_core_wakes_to_read_a_source_that_has_kept_changing() -> None:
+    """ALARM-1: the contact changes from 1 s on. It is active at 3.25 s, and a fault at 4 s."""
+    limits = replace(LIMITS, t=PanelDurations(stale_after_s=60.0))
+    memory = core.initial(limits, 0.0)
+    for now in (0.0, 0.25):
+        off = Sampled(PanelSample({"fire": False}))
+        memory = core.decide(memory, off, now, limits).memory
+    told = []
+    for now in (1.0, 3.125, 3.25, 3.875, 4.0):
+        for on in (False, True):
+            made = core.decide(memory, Sampled(PanelSample({"fire": on})), now, limits)
+            memory = made.memory
+        told.append((made.wake_at, *(fault.code for fault in made.report.faults)))
+    active, fault = "ALARM_SOURCE_ACTIVE", "HAZARD_INPUTS_UNSTEADY"
+    assert told == [
+        (1.25,),
+        (3.25,),
+        (3.5, active),
+        (4.0, active),
+        (4.25, active, fault),
+    ]
+
+
+def test_a_source_behind_a_bus_that_fails_from_the_start_is_no_alarm() -> None:
+    """ALARM-1: the source never settles, but no reading has shown a fire."""
+    panel = Panel()
+    for reading in range(80):
+        panel.unreadable = "no answer" if reading % 2 else ""
+        panel.until(panel.now + STEP_S)
+    assert panel.report.alarm == AlarmInputs(frozenset(), False)
+    assert panel.faults == ["HAZARD_INPUTS_UNSTEADY: fire: not steady within 2 s"]
+
+
+def test_one_bounce_of_a_contact_is_no_alarm_with_any_clear_s() -> None:
+    """ALARM-1: the end of a bounce settles after the debounce, not after `clear_s`."""
+    limits = replace(LIMITS, t=PanelDurations(clear_s=30.0))
+    memory = core.initial(limits, 0.0)
+    for scan in range(160):
+        sample = PanelSample({"fire": scan == 8})
+        made = core.decide(memory, Sampled(sample), scan * STEP_S, limits)
+        memory = made.memory
+        assert made.report.alarm.present == frozenset()
+        assert made.report.faults == ()
+
+
 def test_a_silent_panel_is_a_fault_and_its_sources_stay_unproven() -> None:
     """ALARM-2."""
     panel = Panel().until(1.0)

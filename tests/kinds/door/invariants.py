@@ -8,6 +8,7 @@ from typing import Any
 
 from bridges.kinds.door.core import decide
 from bridges.kinds.door.memory import DoorLimits, DoorMemory
+from bridges.kinds.door.pulses import REST_S
 from bridges.kinds.door.signals import OpenRequested
 from bridges.kinds.shared.decision import Sampled, WriteFailed
 from bridges.messages.definitions import DoorModeValue
@@ -55,18 +56,36 @@ def the_relay_follows_the_hold(step: Step) -> None:
     """Require that the relay is on if and only if the core holds the door open.
 
     With `pulse` the relay is on in pulses. The first pulse begins when the core begins to hold the
-    door.
+    door. A pulse has its length, and the next one comes in time. A pulse in which a scan failed is
+    prolonged, and the next one comes after a short rest.
     """
-    on, pulse = step.decision.outputs.hold_open, step.limits.pulse
-    in_pulse = pulse is None or (step.now - step.ledger.held_since) % pulse.every_s < pulse.on_s
-    assert on == (step.ledger.held and in_pulse)
+    outputs, pulse = step.decision.outputs, step.limits.pulse
+    held, seen = step.ledger.held, step.ledger.pulse
+    if pulse is None or not held:
+        assert (outputs.hold_open, outputs.between_pulses) == (held, False)
+        return
+    assert seen is not None
+    assert outputs.between_pulses == (not outputs.hold_open)
+    rest_s = min(REST_S, pulse.every_s - pulse.on_s)
+    end = seen.at + pulse.on_s
+    if seen.failed_at is not None:
+        end = min(seen.failed_at + pulse.on_s, seen.at + pulse.every_s - rest_s)
+    if seen.off_at is None:
+        assert step.now < end
+        return
+    assert seen.off_at >= end
+    rested = seen.off_at + rest_s
+    assert step.now < (
+        rested if seen.failed_at is not None else max(rested, seen.at + pulse.every_s)
+    )
 
 
 def open_is_the_truth(step: Step) -> None:
     """Require evidence whenever the report shows the door OPEN.
 
     The evidence is a fresh reading of the open contact. If the door has no such contact, and the site
-    permits estimates, the evidence is that the door has been held for the opening time.
+    permits estimates, the evidence is that the door has been held for the opening time. With `pulse`
+    the evidence also includes a pulse before that time, and no failed pulse since.
     """
     shown, sample = step.decision.report, step.world.sample
     if not _sighted(step):
@@ -83,6 +102,10 @@ def open_is_the_truth(step: Step) -> None:
         assert step.ledger.sure_since is not None
         assert delay_s is not None
         assert step.now >= step.ledger.sure_since + delay_s
+        if step.limits.pulse:
+            assert step.ledger.pulse is not None
+            assert step.ledger.pulse.row_since is not None
+            assert step.now >= step.ledger.pulse.row_since + delay_s
         return
     assert not _told_otherwise(step, "opened", step.limits.debounce.get("opened", 0.0))
     if _exact(step):

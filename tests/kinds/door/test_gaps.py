@@ -8,6 +8,7 @@ from bridges.kinds.door.report import DoorReport
 from bridges.kinds.door.settings import DoorDurations
 from bridges.kinds.door.signals import DoorSample, Event
 from bridges.kinds.shared.decision import (
+    AlarmInputs,
     Fault,
     IoFailed,
     Sampled,
@@ -18,6 +19,7 @@ from bridges.messages.definitions import DoorModeValue
 from tests.kinds.door.virtual import (
     BETWEEN,
     CLOSED,
+    CLOSES,
     OPEN,
     OPENS,
     STALE_S,
@@ -116,6 +118,62 @@ def test_a_door_behind_a_bus_that_fails_at_every_second_reading_is_not_shown_ope
     core.sees(CLOSED, until=6.75)
     assert core.told[-1][1] == "CLOSED"
     assert "DOOR_CONTACTS_UNSTEADY" not in str(core.faults())
+
+
+def chatters(core: CoreAlone, hazard: str, until: float) -> None:
+    """Let this contact of an open door change faster than its debounce."""
+    core.limits = replace(core.limits, debounce={hazard: 0.5})
+    core.sees(replace(OPEN, obstruction=False, fire=False), until=core.now + 1.0)
+    on = False
+    while core.now < until:
+        on = not on
+        core.sees(
+            replace(OPEN, **{"obstruction": False, "fire": False, hazard: on}), core.now + 0.25
+        )
+
+
+def test_a_fire_contact_that_chatters_is_a_fire_until_it_was_clear() -> None:
+    """DOOR-SENSING-2: the contact changes from 2 s on. It has a debounce of 0.5 s and RESTLESS_S."""
+    core = CoreAlone(limits())
+    core.sees(OPEN, until=1.0)
+    core.hears(OPENS)
+    chatters(core, "fire", until=8.0)
+    assert core.last is not None
+    assert core.last.report.alarm == AlarmInputs(frozenset({"fire"}), True)
+    assert core.faults() == (
+        "FIRE_ALARM: the door is released",
+        "HAZARD_INPUTS_UNSTEADY: fire: not steady within 2 s",
+    )
+    assert core.told[-1] == (4.5, "UNKNOWN", False)
+    core.sees(replace(OPEN, obstruction=False, fire=False), until=10.0)
+    assert core.faults() == ()
+    assert core.told[-1] == (8.75, "OPEN", False)
+
+
+def test_an_obstruction_that_chatters_holds_a_door_that_closes() -> None:
+    """DOOR-SENSING-2 and DOOR-3."""
+    core = CoreAlone(limits(close_grace_s=4.0))
+    core.hears(OPENS)
+    core.sees(OPEN, until=1.0)
+    core.hears(CLOSES)
+    chatters(core, "obstruction", until=8.0)
+    assert core.told[-1] == (0.0625, "OPEN", True)
+    assert core.faults() == (
+        "HAZARD_INPUTS_UNSTEADY: obstruction: not steady within 2 s",
+        "DOOR_OBSTRUCTED: held open after CLOSE while the doorway is not clear",
+    )
+
+
+def test_the_core_wakes_when_a_hazards_input_counts_as_restless() -> None:
+    """DOOR-SENSING-2."""
+    core = CoreAlone(DoorLimits(DoorDurations(stale_after_s=60.0), debounce={"fire": 0.5}))
+    core.sees(replace(OPEN, fire=False), until=2.0)
+    wakes = []
+    for now in (2.25, 4.5, 4.75):
+        core.now = now
+        core.hears(Sampled(replace(OPEN, fire=False)))
+        wakes.append(core.hears(Sampled(replace(OPEN, fire=True))).wake_at)
+    assert wakes == [2.75, 4.75, 5.25]
 
 
 def test_after_one_reading_and_a_gap_the_position_of_a_door_is_unknown() -> None:

@@ -16,6 +16,9 @@ SITES = {
     "fire holds open": limits_of(on_fire="open"),
     "no contacts": limits_of({"open_delay_s": 4.0}, estimated=True),
     "pulses": limits_of(pulse=Pulse(on_s=0.5, every_s=3.0)),
+    "pulses and no contacts": limits_of(
+        {"open_delay_s": 4.0}, estimated=True, pulse=Pulse(on_s=0.5, every_s=3.0)
+    ),
     "debounced": limits_of(debounce=DEBOUNCED),
 }
 PLAIN = SITES["fire releases"]

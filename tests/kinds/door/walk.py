@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.door.core import decide, initial
 from bridges.kinds.door.memory import DoorLimits, DoorMemory
+from bridges.kinds.door.pulses import DoorPulses
 from bridges.kinds.door.settings import DoorDurations
 from bridges.kinds.door.signals import CloseRequested, DoorSample, Event, OpenRequested
 from bridges.kinds.shared.debounce import Settled
@@ -51,10 +52,10 @@ class Ledger(msgspec.Struct, frozen=True):
     - `shut` says that the last reading shows the door closed.
     - `sure_since` is the time of the last change of the hold, or of the first reading after a failure.
     - `unlike` has a time for each contact in UNLIKE. Since that time all readings were "not asserted".
+    - `pulse` is the last pulse of the hold, if the operator needs pulses.
     """
 
     held: bool = False
-    held_since: float = 0.0
     wanted: bool = False
     ends_at: float | None = None
     let_go: bool = False
@@ -63,6 +64,21 @@ class Ledger(msgspec.Struct, frozen=True):
     rival_at: float | None = None
     sure_since: float | None = None
     unlike: tuple[float | None, ...] = (None, None, None)
+    pulse: "PulseSeen | None" = None
+
+
+class PulseSeen(msgspec.Struct, frozen=True):
+    """A pulse of the relay, as seen from outside. Times are relative to the state's time.
+
+    - `at` is its start, and `off_at` its end.
+    - `failed_at` is the time of the last failed scan while the relay was on.
+    - `row_since` is the start of the first pulse since the last pulse with a failure.
+    """
+
+    at: float
+    off_at: float | None = None
+    failed_at: float | None = None
+    row_since: float | None = None
 
 
 UNLIKE = ("opened", "obstruction", "fire")
@@ -251,14 +267,28 @@ def noted(
     return replace(
         after,
         held=held,
-        held_since=ledger.held_since if held == ledger.held else now,
         wanted=wanted,
         ends_at=ends_at,
         let_go=let_go and not shut,
         shut=shut,
         sure_since=now if sample and sure_since is None else sure_since,
         unlike=_unlike(ledger, event, now, limits),
+        pulse=_pulse(ledger, event, now, decision) if limits.pulse and held else None,
     )
+
+
+def _pulse(ledger: Ledger, event: Event, now: float, decision: Decided) -> PulseSeen:
+    """Return the pulse after a decision that holds the door. The decision tells whether the relay is
+    on."""
+    on, pulse, failed = decision.outputs.hold_open, ledger.pulse, isinstance(event, IoFailed)
+    if pulse and pulse.off_at is None and failed:
+        pulse = replace(pulse, failed_at=now, row_since=None)
+    if pulse and pulse.off_at is None and not on:
+        pulse = replace(pulse, off_at=now)
+    if pulse is None or (pulse.off_at is not None and on):
+        row_since = now if pulse is None or pulse.row_since is None else pulse.row_since
+        pulse = PulseSeen(now, None, now if failed else None, None if failed else row_since)
+    return pulse
 
 
 def fresh(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
@@ -320,7 +350,7 @@ def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
         memory,
         latched_at=_at(memory.latched_at, by, t.max_hold_s or 0.0),
         close_at=_at(memory.close_at, by),
-        held_since=_held_since(memory.held_since, by, limits),
+        held_since=_at(memory.held_since, by, max(t.travel_s, t.open_timeout_s)),
         between_since=_at(memory.between_since, by, t.travel_s),
         shut_since=_at(memory.shut_since, by, t.open_timeout_s),
         rival_at=_at(memory.rival_at, by, RIVAL_QUIET_S),
@@ -333,18 +363,19 @@ def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
             read_at=_at(senses.read_at, by, t.stale_after_s),
             linked_since=_at(senses.linked_since, by, t.travel_s),
         ),
+        pulses=None if memory.pulses is None else _pulses(memory.pulses, by, limits),
     )
 
 
 def _shifted(ledger: Ledger, by: float, limits: DoorLimits) -> Ledger:
     return replace(
         ledger,
-        held_since=_held_since(ledger.held_since, by, limits),
         ends_at=_at(ledger.ends_at, by),
         read_at=_at(ledger.read_at, by, limits.t.stale_after_s),
         rival_at=_at(ledger.rival_at, by, RIVAL_QUIET_S),
         sure_since=_at(ledger.sure_since, by, limits.t.travel_s),
         unlike=tuple(_at(since, by, limits.t.hazard_clear_s) for since in ledger.unlike),
+        pulse=None if ledger.pulse is None else _pulse_seen(ledger.pulse, by, limits),
     )
 
 
@@ -353,13 +384,24 @@ def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
     return None if at is None else max(at + by, -oldest_s)
 
 
-def _held_since(at: float, by: float, limits: DoorLimits) -> float:
-    """Return the start of the hold plus `by`. An age above the limit is shortened by whole pulses, so
-    that the next pulse comes at the same time."""
-    age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
-    if age_s <= oldest_s:
-        return -age_s
-    return -(oldest_s + ((age_s - oldest_s) % limits.pulse.every_s if limits.pulse else 0.0))
+def _pulses(pulses: DoorPulses, by: float, limits: DoorLimits) -> DoorPulses:
+    return replace(
+        pulses,
+        at=pulses.at + by,
+        off_at=_at(pulses.off_at, by),
+        failed_at=_at(pulses.failed_at, by),
+        good_since=_at(pulses.good_since, by, limits.t.travel_s),
+    )
+
+
+def _pulse_seen(pulse: PulseSeen, by: float, limits: DoorLimits) -> PulseSeen:
+    return replace(
+        pulse,
+        at=pulse.at + by,
+        off_at=_at(pulse.off_at, by),
+        failed_at=_at(pulse.failed_at, by),
+        row_since=_at(pulse.row_since, by, limits.t.travel_s),
+    )
 
 
 def _settled(seen: Settled[Any] | None, by: float) -> Any:
