@@ -79,11 +79,15 @@ def _off(services: Collection[Directories], within_s: float) -> set[str]:
         pid, ended = os.waitpid(-1, os.WNOHANG)
         if pid == 0:
             time.sleep(LOOK_EVERY_S)
-        elif (name := running.pop(pid)) and ended == 0:
+        elif (name := running.pop(pid, None)) and ended == 0:  # None: an earlier group's child
             left.discard(name)
     for pid in running:
-        os.kill(pid, signal.SIGKILL)
-        os.waitpid(pid, 0)
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except PermissionError:  # let the other services go on; the child gives up by itself
+            logging.warning(pairs("not_killed", service=running[pid]))
+        else:
+            os.waitpid(pid, 0)
     return left
 
 
