@@ -24,7 +24,13 @@ from pathlib import Path
 from bridges.runtime import dead_daemon
 from bridges.runtime.record import PATTERN, read
 from bridges.system import log
-from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, act_as_owner
+from bridges.system.directories import (
+    SERVICE_FILES,
+    SERVICE_RUN,
+    SERVICE_STATE,
+    Directories,
+    act_as_owner,
+)
 from bridges.system.log import pairs
 from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
@@ -41,7 +47,7 @@ outputs come first."""
 def switch_off_all(
     state: Path = SERVICE_STATE,
     run: Path = SERVICE_RUN,
-    files: Path = Path("/etc/rmf-bridges"),
+    files: Path = SERVICE_FILES,
     own_s: float = OWN_S,
     others_s: float = OTHERS_S,
 ) -> int:

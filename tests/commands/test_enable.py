@@ -263,6 +263,15 @@ def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
     assert kept.exists()
 
 
+def test_outputs_are_switched_off_in_the_services_own_directories(tmp_path: Path) -> None:
+    left = tmp_path / "ward" / "claimed-1.json"
+    left.parent.mkdir()
+    left.touch()
+    places = {"RUNTIME_DIRECTORY": "/run/rmf-bridge/ward", "STATE_DIRECTORY": str(left.parent)}
+    code = f"import os, sys; sys.exit(not {places!r}.items() <= os.environ.items())"
+    assert services._off((sys.executable, "-c", code), left.parent) == 0
+
+
 def test_after_a_failed_step_the_stopped_service_starts_again(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
