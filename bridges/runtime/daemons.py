@@ -4,7 +4,7 @@ directories and by their systemd units."""
 import json
 import shutil
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, cast
@@ -14,10 +14,18 @@ import msgspec
 from bridges.messages.words import printable
 from bridges.runtime import holder
 from bridges.runtime.diagnostics import CERTIFICATE_FILES
+from bridges.runtime.holder import LockHolder
 from bridges.runtime.record import paths, read
 from bridges.runtime.subject import Status
 from bridges.system import files
-from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, owner_of, state_base
+from bridges.system.directories import (
+    SERVICE_RUN,
+    SERVICE_STATE,
+    Directories,
+    owner_of,
+    runtimes,
+    state_base,
+)
 
 UNIT: Final = "rmf-bridge@"
 
@@ -125,6 +133,21 @@ def daemons(
             yield _daemon(folder, by, unit, wall)
     for name, unit in rest.items():
         yield DaemonStatus(name=name, state=_without_directory(unit), by="service", unit=unit)
+
+
+def by_hand(files: Container[str]) -> Iterator[tuple[Path, LockHolder]]:
+    """Yield the living daemons that this user sees and that a person started by hand for one of these
+    files. `files`: canonical paths. Yield each daemon with its runtime directory. Leave out
+    simulations, which use no hardware."""
+    for folder in runtimes():
+        if folder.parent == SERVICE_RUN:
+            continue
+        with suppress(PermissionError):
+            found = holder.look(Directories(folder, folder))
+            if found is None or not found.serves or found.file not in files:
+                continue
+            if not _read(folder / holder.STATUS, 0.0)[0].get("simulated"):
+                yield folder, found
 
 
 def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:

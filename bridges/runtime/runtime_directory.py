@@ -80,7 +80,8 @@ def _is_services(places: Directories, file: Path) -> bool:
     return own and any(map(os.path.lexists, places.folders))
 
 
-def _in_use(folder: Path, found: LockHolder | None) -> str:
+def in_use(folder: Path, found: LockHolder | None) -> str:
+    """Return the error for a directory that another process holds, with a remedy."""
     if found is None:
         return f"{folder / LOCK} is locked by an unnamed program: end that program"
     if not found.serves:
@@ -249,7 +250,7 @@ class RuntimeDirectory:
             found = holder.look(self.places)
             if (found and found.serves) or time.monotonic() >= deadline:
                 self._unlock()
-                raise AlreadyRunning(_in_use(folder, found))
+                raise AlreadyRunning(in_use(folder, found))
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:
