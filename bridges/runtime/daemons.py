@@ -15,15 +15,14 @@ from bridges.messages.words import printable
 from bridges.runtime import holder
 from bridges.runtime.diagnostics import CERTIFICATE_FILES
 from bridges.runtime.holder import LockHolder
-from bridges.runtime.record import paths, read
+from bridges.runtime.record import PATTERN, Records
 from bridges.runtime.subject import Status
-from bridges.system import files
+from bridges.system import directories, files
 from bridges.system.directories import (
     SERVICE_RUN,
     SERVICE_STATE,
     Directories,
     owner_of,
-    runtimes,
     state_base,
 )
 
@@ -135,11 +134,22 @@ def daemons(
         yield DaemonStatus(name=name, state=_without_directory(unit), by="service", unit=unit)
 
 
+def folders() -> Iterator[Path]:
+    """Yield the runtime directories of the daemons that this user sees. Yield also the missing runtime
+    directory of each service that left a record: systemd removes the directory at the service's end,
+    although its outputs may be on."""
+    found = list(directories.runtimes())
+    yield from found
+    with suppress(OSError):
+        left = {SERVICE_RUN / path.parent.name for path in SERVICE_STATE.glob(f"*/{PATTERN}")}
+        yield from sorted(left.difference(found))
+
+
 def by_hand(files: Container[str]) -> Iterator[tuple[Path, LockHolder]]:
     """Yield the living daemons that this user sees and that a person started by hand for one of these
     files. `files`: canonical paths. Yield each daemon with its runtime directory. Leave out
     simulations, which use no hardware."""
-    for folder in runtimes():
+    for folder in directories.runtimes():
         if folder.parent == SERVICE_RUN:
             continue
         with suppress(PermissionError):
@@ -175,12 +185,11 @@ def _unreleased(folder: Path) -> str:
     """Return an instruction for the case that a dead daemon has left outputs on. Return "" if the
     daemon left no record."""
     state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
-    for path in paths(Directories(folder, state / folder.name)):
-        if record := read(path):
-            return (
-                f"do: rmf-bridge outputs-off {record.file}; if the device will not answer"
-                f" again, cut its relays' supply and remove {path}"
-            )
+    for path, record in Records(Directories(folder, state / folder.name)).left_on().items():
+        return (
+            f"do: rmf-bridge outputs-off {record.file}; if the device will not answer"
+            f" again, cut its relays' supply and remove {path}"
+        )
     return ""
 
 

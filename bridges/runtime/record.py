@@ -161,15 +161,16 @@ class Records:
     def unreleased(self) -> list[ClaimRecord]:
         """Return the records whose outputs are not all off. Log unreadable records, and leave them
         out."""
+        for path in paths(self._places):
+            if read(path) is None:
+                log.warning(pairs("record_not_read", path=path))
         return list(self.left_on().values())
 
     def left_on(self) -> dict[Path, ClaimRecord]:
-        """Return `unreleased` with the path of each record."""
+        """Return `unreleased` with the path of each record. Log nothing."""
         by_name = dict[str, tuple[Path, ClaimRecord]]()
         for path in paths(self._places):
-            if (record := read(path)) is None:
-                log.warning(pairs("record_not_read", path=path))
-            else:
+            if record := read(path):
                 by_name[record.name] = (path, record)
         return {path: record for path, record in by_name.values() if not record.all_safe}
 

@@ -18,8 +18,11 @@ from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, DaemonStatus, daem
 from bridges.runtime.holder import HOLDER
 from bridges.runtime.record import Records, of
 from bridges.settings.load import load
+from bridges.system import directories
 from bridges.system.directories import Directories
 from tests.commands.runtime import served
+from workbench.metrics.machine import of_machine
+from workbench.notify.troubles import LEFT_ON, of_daemons
 
 ROOT = Path(__file__).parents[2]
 STUCK = {"code": "DOOR_OPENING_FAULT", "detail": "held, but not open after 8 s"}
@@ -183,6 +186,27 @@ def test_outputs_that_nobody_has_verified_off_are_reported_even_without_a_status
     )
 
 
+@pytest.mark.parametrize("unit", ["failed (failed)", "inactive (dead)", ""])
+def test_outputs_left_on_are_reported_also_when_systemd_has_removed_the_runtime_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str
+) -> None:
+    """systemd removes it at the end of a service. It forgets a disabled unit too."""
+    run, state = tmp_path / "run", tmp_path / "state"
+    monkeypatch.setattr(on_machine, "SERVICE_RUN", run)
+    monkeypatch.setattr(on_machine, "SERVICE_STATE", state)
+    monkeypatch.setattr(directories, "SERVICE_RUN", run)
+    places = Directories(run / "ward", state / "ward")
+    Records(places).write(of(load(ROOT / "config" / "door_modbus.yaml")))
+    (state / "clean").mkdir()
+    units = {"ward": unit} if unit else {}
+    found = [one for one in daemons(on_machine.folders(), units, 0.0) if one.by == "service"]
+    assert [(one.name, one.state, one.unit) for one in found] == [("ward", "left on", unit)]
+    (trouble,) = of_daemons(found, ())
+    assert trouble.what == LEFT_ON
+    (left_on,) = (one for one in of_machine(found) if one.name.endswith("outputs_unverified"))
+    assert [sample.value for sample in left_on.samples] == [1]
+
+
 def test_a_dead_simulation_has_nothing_to_switch_off(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift() | {"simulated": True}) as folder:
         pass
@@ -324,7 +348,7 @@ def test_a_named_daemon_that_does_not_exist_is_not_idle(
 ) -> None:
     monkeypatch.setattr(status, "units", dict)
     with served(tmp_path / "lift_a", lift()) as folder:
-        monkeypatch.setattr(status, "runtimes", lambda: [folder][:others])
+        monkeypatch.setattr(status, "daemon_folders", lambda: [folder][:others])
         for line in (["ghost"], ["--runtime-dir", str(tmp_path / "ghost")]):
             assert cli.main(["status", "--idle", *line]) == NONE
             told = capsys.readouterr()
