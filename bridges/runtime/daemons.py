@@ -23,7 +23,7 @@ from bridges.system.directories import (
     SERVICE_STATE,
     Directories,
     owner_of,
-    state_base,
+    state_base_of,
 )
 
 UNIT: Final = "rmf-bridge@"
@@ -184,7 +184,7 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
 def _unreleased(folder: Path) -> str:
     """Return an instruction for the case that a dead daemon has left outputs on. Return "" if the
     daemon left no record."""
-    state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
+    state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base_of(folder)
     for path, record in Records(Directories(folder, state / folder.name)).left_on().items():
         return (
             f"do: rmf-bridge outputs-off {record.file}; if the device will not answer"

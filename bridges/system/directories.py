@@ -89,6 +89,16 @@ def state_base() -> Path:
     return Path(os.environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
 
 
+def state_base_of(folder: Path) -> Path:
+    """Return the state directory of the user who owns this runtime directory. The environment of
+    another user cannot be seen, so only that user's home counts."""
+    with suppress(OSError, KeyError):
+        uid = folder.lstat().st_uid
+        if uid != os.geteuid():
+            return Path(pwd.getpwuid(uid).pw_dir) / ".local/state/rmf-bridge"
+    return state_base()
+
+
 def everywhere(file: Path) -> Iterator[Directories]:
     """Yield the possible directories of this file's daemon. They depend on who started the daemon:
     systemd, the user who called sudo (only for root), or this user."""

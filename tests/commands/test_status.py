@@ -2,6 +2,8 @@
 
 import io
 import json
+import os
+import pwd
 import re
 from pathlib import Path
 from typing import Any
@@ -205,6 +207,24 @@ def test_outputs_left_on_are_reported_also_when_systemd_has_removed_the_runtime_
     assert trouble.what == LEFT_ON
     (left_on,) = (one for one in of_machine(found) if one.name.endswith("outputs_unverified"))
     assert [sample.value for sample in left_on.samples] == [1]
+
+
+def test_root_sees_the_outputs_that_a_users_daemon_left_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    user = pwd.getpwuid(os.getuid())
+    home = pwd.struct_passwd((*user[:5], str(tmp_path / "home"), user.pw_shell))
+    monkeypatch.setattr(pwd, "getpwuid", lambda uid: home)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "of_root"))
+    folder = tmp_path / "ward"
+    folder.mkdir()
+    places = Directories(folder, tmp_path / "home/.local/state/rmf-bridge/ward")
+    path = Records(places).write(of(load(ROOT / "config" / "door_modbus.yaml")))
+    assert [one.state for one in seen(folder)] == ["stopped"]
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    (one,) = seen(folder)
+    assert one.state == "left on"
+    assert str(path) in one.why
 
 
 def test_a_dead_simulation_has_nothing_to_switch_off(tmp_path: Path) -> None:
