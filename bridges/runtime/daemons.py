@@ -209,7 +209,7 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
         raise
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return {}, None
-    return found, max(0.0, wall - written_at)
+    return found, abs(wall - written_at)  # a status from the future is not fresh either
 
 
 def units() -> dict[str, str]:

@@ -227,6 +227,12 @@ def test_root_sees_the_outputs_that_a_users_daemon_left_on(
     assert str(path) in one.why
 
 
+def test_a_daemon_that_hangs_is_not_serving_after_the_clock_was_set_back(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        (found,) = seen(folder, age_s=-3600.0)
+    assert (found.state, found.level) == ("old", DOWN)
+
+
 def test_a_dead_simulation_has_nothing_to_switch_off(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift() | {"simulated": True}) as folder:
         pass
