@@ -70,7 +70,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     "enable": {
         0: "the service runs",
         1: SYSTEMS,
-        69: "an output is not verified off",
+        69: "an output is not verified off, or a daemon that a person started serves the file",
         **ROOT,
         78: "the YAML or a file that it names has an error, or it contradicts another service's YAML",
     },

@@ -29,6 +29,8 @@ from typing import Final
 from msgspec.structs import replace
 
 from bridges.runtime import drop_in
+from bridges.runtime.daemons import by_hand
+from bridges.runtime.runtime_directory import in_use
 from bridges.runtime.services import (
     CONFIG,
     INSTANCE,
@@ -50,7 +52,7 @@ from bridges.runtime.services import (
 from bridges.settings.cross_file_checks import shared_secrets, taken
 from bridges.settings.load import Config, Problem, SettingsError, load
 from bridges.settings.named_files import SECRETS, named_files
-from bridges.system.directories import GROUPS, user_of
+from bridges.system.directories import GROUPS, SERVICE_FILES, named, user_of
 
 FLEET: Final = "fleet"
 BESIDE: Final = f"a fleet's YAML: write whole paths, or copy both files of RMF to /{CONFIG}"
@@ -92,6 +94,9 @@ def run(args: argparse.Namespace) -> int:
         known = user if user in numbers(args.root / "etc/passwd") else ""
         print(drop_in.text(config, groups(args.root), known), end="")
         return 0
+    if args.root == Path("/") and (told := runs_by_hand(config)):
+        print(told, file=sys.stderr)
+        return os.EX_UNAVAILABLE
     for problem in config.warnings:
         print(problem, file=sys.stderr)
     planned = steps(config, args.root, groups(args.root))
@@ -119,6 +124,14 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
     yield Run(("systemctl", "daemon-reload"), running_only=True)
     yield Run(("systemctl", "enable", "rmf-bridges.target", unit(name)))
     yield Run(("systemctl", "start", unit(name)), running_only=True)
+
+
+def runs_by_hand(config: Config) -> str:
+    """Return an error if a person's daemon serves this file, because a device can have only one daemon.
+    Return "" if this user sees no such daemon. A user other than root does not see the daemons of other
+    users, and nobody sees a daemon with `--runtime-dir`."""
+    files = {named(config.path), named(SERVICE_FILES / f"{config.path.stem}.yaml")}
+    return next((in_use(*found) for found in by_hand(files)), "")
 
 
 def groups(root: Path) -> set[str]:

@@ -17,10 +17,10 @@ import msgspec
 
 from bridges.messages.words import printable
 from bridges.runtime.daemons import NONE, DaemonStatus, daemons, units
+from bridges.runtime.daemons import folders as daemon_folders
 from bridges.runtime.faults import Remedy, here, remedies, values
 from bridges.runtime.services import service_name
 from bridges.runtime.subject import Status
-from bridges.system.directories import runtimes
 from bridges.system.paint import bold, red
 
 IN_USE: Final[Mapping[str, tuple[str, ...]]] = {
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     With `--idle`, return 0 if no device is in use, and 4 if a device is in use. A named daemon that
     does not exist is not idle, so the result is 3.
     """
-    folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
+    folders = [Path(args.runtime_dir)] if args.runtime_dir else list(daemon_folders())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
         there = [one.name for one in found if one.state != "stopped" or one.unit]

@@ -24,7 +24,13 @@ from pathlib import Path
 from bridges.runtime import dead_daemon
 from bridges.runtime.record import PATTERN, read
 from bridges.system import log
-from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, act_as_owner
+from bridges.system.directories import (
+    SERVICE_FILES,
+    SERVICE_RUN,
+    SERVICE_STATE,
+    Directories,
+    act_as_owner,
+)
 from bridges.system.log import pairs
 from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
@@ -41,7 +47,7 @@ outputs come first."""
 def switch_off_all(
     state: Path = SERVICE_STATE,
     run: Path = SERVICE_RUN,
-    files: Path = Path("/etc/rmf-bridges"),
+    files: Path = SERVICE_FILES,
     own_s: float = OWN_S,
     others_s: float = OTHERS_S,
 ) -> int:
@@ -79,11 +85,15 @@ def _off(services: Collection[Directories], within_s: float) -> set[str]:
         pid, ended = os.waitpid(-1, os.WNOHANG)
         if pid == 0:
             time.sleep(LOOK_EVERY_S)
-        elif (name := running.pop(pid)) and ended == 0:
+        elif (name := running.pop(pid, None)) and ended == 0:  # None: an earlier group's child
             left.discard(name)
     for pid in running:
-        os.kill(pid, signal.SIGKILL)
-        os.waitpid(pid, 0)
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except PermissionError:  # let the other services go on; the child gives up by itself
+            logging.warning(pairs("not_killed", service=running[pid]))
+        else:
+            os.waitpid(pid, 0)
     return left
 
 

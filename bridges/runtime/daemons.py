@@ -4,7 +4,7 @@ directories and by their systemd units."""
 import json
 import shutil
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, cast
@@ -14,10 +14,17 @@ import msgspec
 from bridges.messages.words import printable
 from bridges.runtime import holder
 from bridges.runtime.diagnostics import CERTIFICATE_FILES
-from bridges.runtime.record import paths, read
+from bridges.runtime.holder import LockHolder
+from bridges.runtime.record import PATTERN, Records
 from bridges.runtime.subject import Status
-from bridges.system import files
-from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, owner_of, state_base
+from bridges.system import directories, files
+from bridges.system.directories import (
+    SERVICE_RUN,
+    SERVICE_STATE,
+    Directories,
+    owner_of,
+    state_base_of,
+)
 
 UNIT: Final = "rmf-bridge@"
 
@@ -127,6 +134,32 @@ def daemons(
         yield DaemonStatus(name=name, state=_without_directory(unit), by="service", unit=unit)
 
 
+def folders() -> Iterator[Path]:
+    """Yield the runtime directories of the daemons that this user sees. Yield also the missing runtime
+    directory of each service that left a record: systemd removes the directory at the service's end,
+    although its outputs may be on."""
+    found = list(directories.runtimes())
+    yield from found
+    with suppress(OSError):
+        left = {SERVICE_RUN / path.parent.name for path in SERVICE_STATE.glob(f"*/{PATTERN}")}
+        yield from sorted(left.difference(found))
+
+
+def by_hand(files: Container[str]) -> Iterator[tuple[Path, LockHolder]]:
+    """Yield the living daemons that this user sees and that a person started by hand for one of these
+    files. `files`: canonical paths. Yield each daemon with its runtime directory. Leave out
+    simulations, which use no hardware."""
+    for folder in directories.runtimes():
+        if folder.parent == SERVICE_RUN:
+            continue
+        with suppress(PermissionError):
+            found = holder.look(Directories(folder, folder))
+            if found is None or not found.serves or found.file not in files:
+                continue
+            if not _read(folder / holder.STATUS, 0.0)[0].get("simulated"):
+                yield folder, found
+
+
 def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
     one = DaemonStatus(name=folder.name, state="stopped", by=by, unit=unit)
     try:
@@ -151,13 +184,12 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
 def _unreleased(folder: Path) -> str:
     """Return an instruction for the case that a dead daemon has left outputs on. Return "" if the
     daemon left no record."""
-    state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
-    for path in paths(Directories(folder, state / folder.name)):
-        if record := read(path):
-            return (
-                f"do: rmf-bridge outputs-off {record.file}; if the device will not answer"
-                f" again, cut its relays' supply and remove {path}"
-            )
+    state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base_of(folder)
+    for path, record in Records(Directories(folder, state / folder.name)).left_on().items():
+        return (
+            f"do: rmf-bridge outputs-off {record.file}; if the device will not answer"
+            f" again, cut its relays' supply and remove {path}"
+        )
     return ""
 
 
@@ -177,7 +209,7 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
         raise
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return {}, None
-    return found, max(0.0, wall - written_at)
+    return found, abs(wall - written_at)  # a status from the future is not fresh either
 
 
 def units() -> dict[str, str]:

@@ -77,6 +77,11 @@ class ClaimRecord(Claimed, frozen=True):
         del claimed["tried"]  # older versions lack this field, but must compute the same name
         return f"claimed-{hashlib.sha256(msgspec.json.encode(claimed)).hexdigest()[:16]}.json"
 
+    @property
+    def all_safe(self) -> bool:
+        """Whether the outputs of all devices are verified off."""
+        return self.claim is not None and self.claim.devices.keys() <= {*self.safe}
+
     def config(self) -> Config:
         """Return the Config of the record. Raises SettingsError if this version refuses the record's
         YAML.
@@ -145,6 +150,9 @@ class Records:
 
     A record of another file counts too. It is there if the YAML's path was a link that now leads
     elsewhere, or if another YAML with the same name had this directory.
+
+    A record in the runtime directory was written later than its copy in the state directory, because
+    that could not be written. It therefore counts, and the copy does not.
     """
 
     def __init__(self, places: Directories) -> None:
@@ -153,16 +161,22 @@ class Records:
     def unreleased(self) -> list[ClaimRecord]:
         """Return the records whose outputs are not all off. Log unreadable records, and leave them
         out."""
-        by_name = dict[str, ClaimRecord]()
         for path in paths(self._places):
-            if (record := read(path)) is None:
+            if read(path) is None:
                 log.warning(pairs("record_not_read", path=path))
-            else:
-                by_name[record.name] = record
-        return list(by_name.values())
+        return list(self.left_on().values())
+
+    def left_on(self) -> dict[Path, ClaimRecord]:
+        """Return `unreleased` with the path of each record. Log nothing."""
+        by_name = dict[str, tuple[Path, ClaimRecord]]()
+        for path in paths(self._places):
+            if record := read(path):
+                by_name[record.name] = (path, record)
+        return {path: record for path, record in by_name.values() if not record.all_safe}
 
     def write(self, record: ClaimRecord) -> Path:
-        """Write a record and return its path. Raises OSError if both directories cannot be written."""
+        """Write a record and return its path. Remove a copy of the record that was written elsewhere
+        later, because it would count. Raises OSError if both directories cannot be written."""
         content = msgspec.json.encode(record)
         refused: OSError | None = None
         for folder in self._places.folders:
@@ -174,9 +188,17 @@ class Records:
             except OSError as error:
                 refused = refused or error
             else:
+                if refused is None:
+                    self._remove_later(record)
                 return path
         assert refused is not None
         raise refused
+
+    def _remove_later(self, record: ClaimRecord) -> None:
+        """Remove the copy of a record that `write` left when it could not write the first folder."""
+        for folder in self._places.folders[1:]:
+            with suppress(OSError), opened(folder):
+                (folder / record.name).unlink(missing_ok=True)
 
     def still_unsafe(self, record: ClaimRecord, devices: Collection[str], config: Config) -> None:
         """Note in the record that only `devices` are not yet verified off. Raises OSError."""
@@ -184,13 +206,24 @@ class Records:
         self.write(msgspec.structs.replace(record, safe=safe, tried=True))
 
     def release(self, record: ClaimRecord) -> None:
-        """Remove a record whose outputs are all off. Raises OSError.
+        """Remove a record whose outputs are all off. If a copy cannot be removed, note in the record
+        that all devices are safe, because otherwise a living daemon's outputs could be switched off.
+        Raises OSError if this cannot be noted either.
 
         If another version wrote the record, the file's name may differ from the record's `name`.
         """
+        refused: OSError | None = None
         for path in list(paths(self._places)):
             if path.name == record.name or ((found := read(path)) and found.name == record.name):
-                path.unlink(missing_ok=True)
+                try:
+                    path.unlink(missing_ok=True)
+                except OSError as error:
+                    refused = refused or error
+        if refused is not None:
+            if record.claim is None:
+                raise refused
+            safe = tuple(record.claim.devices)
+            self.write(msgspec.structs.replace(record, safe=safe, tried=True))
 
 
 def paths(places: Directories) -> Iterator[Path]:

@@ -25,6 +25,7 @@ from bridges.runtime.holder import HOLDER, STATUS, LockHolder
 from bridges.runtime.record import ClaimRecord, Records, paths, read
 from bridges.system import files
 from bridges.system.directories import (
+    SERVICE_FILES,
     SERVICE_RUN,
     SERVICE_STATE,
     Directories,
@@ -33,6 +34,7 @@ from bridges.system.directories import (
     by_hand,
     everywhere,
     named,
+    of_service,
     opened,
     state_base,
 )
@@ -68,10 +70,18 @@ def _is_about(places: Directories, file: Path) -> bool:
     holders = [holder.shown(places), *map(holder.written, places.folders)]
     found = {one.file for one in holders if one}
     found |= {record.file for path in paths(places) if (record := read(path))}
-    return named(file) in found
+    return named(file) in found or _is_services(places, file)
 
 
-def _in_use(folder: Path, found: LockHolder | None) -> str:
+def _is_services(places: Directories, file: Path) -> bool:
+    """Return whether these are the existing directories of the service whose YAML the file is. The file
+    may be a link that led elsewhere when the service started."""
+    own = file.parent == SERVICE_FILES and places == of_service(file)
+    return own and any(map(os.path.lexists, places.folders))
+
+
+def in_use(folder: Path, found: LockHolder | None) -> str:
+    """Return the error for a directory that another process holds, with a remedy."""
     if found is None:
         return f"{folder / LOCK} is locked by an unnamed program: end that program"
     if not found.serves:
@@ -240,7 +250,7 @@ class RuntimeDirectory:
             found = holder.look(self.places)
             if (found and found.serves) or time.monotonic() >= deadline:
                 self._unlock()
-                raise AlreadyRunning(_in_use(folder, found))
+                raise AlreadyRunning(in_use(folder, found))
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:

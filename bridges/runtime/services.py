@@ -15,10 +15,16 @@ from typing import Final
 
 from bridges.runtime.daemons import UNIT, units
 from bridges.runtime.record import PATTERN
-from bridges.system.directories import SERVICE_STATE, SERVICE_USER, user_of
+from bridges.system.directories import (
+    SERVICE_FILES,
+    SERVICE_RUN,
+    SERVICE_STATE,
+    SERVICE_USER,
+    user_of,
+)
 from bridges.system.files import replace
 
-CONFIG: Final = Path("etc/rmf-bridges")
+CONFIG: Final = SERVICE_FILES.relative_to("/")
 SYSTEMD: Final = Path("etc/systemd/system")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 """The pattern of a service's name. It allows only characters that systemd does not escape."""
@@ -239,7 +245,8 @@ def _taken(step: Step, root: Path) -> int:
 
 def _off(words: tuple[str, ...], state: Path) -> int:
     left = sorted(state.glob(PATTERN))
-    if not left or subprocess.run(words).returncode == 0:
+    places = {"RUNTIME_DIRECTORY": str(SERVICE_RUN / state.name), "STATE_DIRECTORY": str(state)}
+    if not left or subprocess.run(words, env=os.environ | places).returncode == 0:
         return 0
     print(LEFT_ON.format(state.name, shlex.join(map(str, left))), file=sys.stderr)
     return os.EX_UNAVAILABLE

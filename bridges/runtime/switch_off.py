@@ -9,10 +9,11 @@ import math
 import threading
 import time
 from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 from bridges.settings.config import Config
 from bridges.system.log import pairs
-from drivers import DriverError
+from drivers import Driver, DriverError
 from drivers.hal import Bus, HalError
 
 log = logging.getLogger(__name__)
@@ -77,8 +78,9 @@ def _device_off(
     config: Config, name: str, bus: Bus, results: dict[str, bool], last: bool = False
 ) -> bool:
     """Try to switch one device off. Log and count a failure only in the `last` attempt."""
-    driver = config.driver_type(name).create(name, config.devices[name], bus)
+    driver = None
     try:
+        driver = config.driver_type(name).create(name, config.devices[name], bus)
         driver.open()
         driver.make_safe()
     except Exception as error:  # noqa: BLE001 - logged by _failed
@@ -87,10 +89,20 @@ def _device_off(
             results[name] = False
         return False
     finally:
-        driver.close()
+        if driver is not None:
+            _close(driver, name)
     log.info(pairs("outputs_off", device=name))
     results[name] = True
     return True
+
+
+def _close(driver: Driver[Any, Any], name: str) -> None:
+    """Release the device. Only log an exception, which is a mistake of our own code. It says nothing
+    about the outputs, because `make_safe` has verified them."""
+    try:
+        driver.close()
+    except Exception:
+        log.exception(pairs("not_closed", device=name))
 
 
 def _failed(name: str, error: Exception) -> None:

@@ -2,7 +2,9 @@
 
 1. the directory that the command line gives
 2. in a systemd unit, the directories that systemd gives
-3. the service's directories, if the lock or the record in them names this file
+3. the service's directories, if the lock or the record in them names this file. For
+   /etc/rmf-bridges/NAME.yaml it is enough that the directories exist, because the file may be a link
+   that led elsewhere when the service started
 4. the directories of a daemon that a person started by hand. For root, the directories of the user who
    called sudo come before root's own.
 
@@ -25,6 +27,7 @@ from msgspec import Struct
 
 SERVICE_RUN = Path("/run/rmf-bridge")
 SERVICE_STATE = Path("/var/lib/rmf-bridge")
+SERVICE_FILES = Path("/etc/rmf-bridges")
 USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
 SERVICE_USER = "rmf-bridge"
@@ -84,6 +87,16 @@ def state_base() -> Path:
     home = os.path.expanduser("~")
     default = Path(home) / ".local/state" if os.path.isabs(home) else TMP / f"rmf-{os.getuid()}"
     return Path(os.environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
+
+
+def state_base_of(folder: Path) -> Path:
+    """Return the state directory of the user who owns this runtime directory. The environment of
+    another user cannot be seen, so only that user's home counts."""
+    with suppress(OSError, KeyError):
+        uid = folder.lstat().st_uid
+        if uid != os.geteuid():
+            return Path(pwd.getpwuid(uid).pw_dir) / ".local/state/rmf-bridge"
+    return state_base()
 
 
 def everywhere(file: Path) -> Iterator[Directories]:

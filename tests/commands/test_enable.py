@@ -1,6 +1,7 @@
 """`enable` and `disable`: their steps in order, and their refusals."""
 
 import argparse
+import json
 import os
 import shlex
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 from bridges.cli import main
 from bridges.commands import disable, enable
 from bridges.runtime import drop_in, services
+from bridges.runtime.runtime_directory import RuntimeDirectory
 from bridges.runtime.services import (
     GiveSecret,
     Remove,
@@ -22,7 +24,7 @@ from bridges.runtime.services import (
     switch_off,
 )
 from bridges.settings.load import load
-from bridges.system.directories import user_of
+from bridges.system.directories import Directories, user_of
 
 CONFIG = Path(__file__).parents[2] / "config"
 LIFT = CONFIG / "lift_dry_contact.yaml"
@@ -158,6 +160,26 @@ def test_without_a_start_all_other_steps_are_done(capsys: pytest.CaptureFixture[
     assert whole[-1] == f"systemctl start {UNIT}"
 
 
+@pytest.mark.parametrize("simulated", [False, True])
+def test_a_file_that_a_person_runs_becomes_no_service_unless_it_is_simulated(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    simulated: bool,
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    run = tmp_path / "rmf-bridge" / "lift_dry_contact"
+    serving = RuntimeDirectory(Directories(run, run), LIFT, serves=True)
+    serving.write_status(json.dumps({"simulated": simulated}).encode())
+    code = main(["enable", str(LIFT), "--dry-run"])
+    told = capsys.readouterr()
+    assert (code, told.out == "") == ((0, False) if simulated else (os.EX_UNAVAILABLE, True))
+    stop = f"Ctrl-C where it runs, or kill {os.getpid()}"
+    assert (stop in told.err) != simulated
+    serving.close()
+    assert main(["enable", str(LIFT), "--dry-run"]) == 0
+
+
 def test_pins_of_another_service_are_refused_with_their_place(
     tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -289,6 +311,15 @@ def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
     assert "the outputs of ward are not verified off" in told
     assert f"rm {left}" in told
     assert kept.exists()
+
+
+def test_outputs_are_switched_off_in_the_services_own_directories(tmp_path: Path) -> None:
+    left = tmp_path / "ward" / "claimed-1.json"
+    left.parent.mkdir()
+    left.touch()
+    places = {"RUNTIME_DIRECTORY": "/run/rmf-bridge/ward", "STATE_DIRECTORY": str(left.parent)}
+    code = f"import os, sys; sys.exit(not {places!r}.items() <= os.environ.items())"
+    assert services._off((sys.executable, "-c", code), left.parent) == 0
 
 
 def test_after_a_failed_step_the_stopped_service_starts_again(

@@ -2,6 +2,8 @@
 
 import io
 import json
+import os
+import pwd
 import re
 from pathlib import Path
 from typing import Any
@@ -18,8 +20,11 @@ from bridges.runtime.daemons import DOWN, FAULTY, NONE, WELL, DaemonStatus, daem
 from bridges.runtime.holder import HOLDER
 from bridges.runtime.record import Records, of
 from bridges.settings.load import load
+from bridges.system import directories
 from bridges.system.directories import Directories
 from tests.commands.runtime import served
+from workbench.metrics.machine import of_machine
+from workbench.notify.troubles import LEFT_ON, of_daemons
 
 ROOT = Path(__file__).parents[2]
 STUCK = {"code": "DOOR_OPENING_FAULT", "detail": "held, but not open after 8 s"}
@@ -183,6 +188,51 @@ def test_outputs_that_nobody_has_verified_off_are_reported_even_without_a_status
     )
 
 
+@pytest.mark.parametrize("unit", ["failed (failed)", "inactive (dead)", ""])
+def test_outputs_left_on_are_reported_also_when_systemd_has_removed_the_runtime_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str
+) -> None:
+    """systemd removes it at the end of a service. It forgets a disabled unit too."""
+    run, state = tmp_path / "run", tmp_path / "state"
+    monkeypatch.setattr(on_machine, "SERVICE_RUN", run)
+    monkeypatch.setattr(on_machine, "SERVICE_STATE", state)
+    monkeypatch.setattr(directories, "SERVICE_RUN", run)
+    places = Directories(run / "ward", state / "ward")
+    Records(places).write(of(load(ROOT / "config" / "door_modbus.yaml")))
+    (state / "clean").mkdir()
+    units = {"ward": unit} if unit else {}
+    found = [one for one in daemons(on_machine.folders(), units, 0.0) if one.by == "service"]
+    assert [(one.name, one.state, one.unit) for one in found] == [("ward", "left on", unit)]
+    (trouble,) = of_daemons(found, ())
+    assert trouble.what == LEFT_ON
+    (left_on,) = (one for one in of_machine(found) if one.name.endswith("outputs_unverified"))
+    assert [sample.value for sample in left_on.samples] == [1]
+
+
+def test_root_sees_the_outputs_that_a_users_daemon_left_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    user = pwd.getpwuid(os.getuid())
+    home = pwd.struct_passwd((*user[:5], str(tmp_path / "home"), user.pw_shell))
+    monkeypatch.setattr(pwd, "getpwuid", lambda uid: home)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "of_root"))
+    folder = tmp_path / "ward"
+    folder.mkdir()
+    places = Directories(folder, tmp_path / "home/.local/state/rmf-bridge/ward")
+    path = Records(places).write(of(load(ROOT / "config" / "door_modbus.yaml")))
+    assert [one.state for one in seen(folder)] == ["stopped"]
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    (one,) = seen(folder)
+    assert one.state == "left on"
+    assert str(path) in one.why
+
+
+def test_a_daemon_that_hangs_is_not_serving_after_the_clock_was_set_back(tmp_path: Path) -> None:
+    with served(tmp_path / "lift_a", lift()) as folder:
+        (found,) = seen(folder, age_s=-3600.0)
+    assert (found.state, found.level) == ("old", DOWN)
+
+
 def test_a_dead_simulation_has_nothing_to_switch_off(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift() | {"simulated": True}) as folder:
         pass
@@ -324,7 +374,7 @@ def test_a_named_daemon_that_does_not_exist_is_not_idle(
 ) -> None:
     monkeypatch.setattr(status, "units", dict)
     with served(tmp_path / "lift_a", lift()) as folder:
-        monkeypatch.setattr(status, "runtimes", lambda: [folder][:others])
+        monkeypatch.setattr(status, "daemon_folders", lambda: [folder][:others])
         for line in (["ghost"], ["--runtime-dir", str(tmp_path / "ghost")]):
             assert cli.main(["status", "--idle", *line]) == NONE
             told = capsys.readouterr()

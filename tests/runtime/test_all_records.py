@@ -61,13 +61,13 @@ def port(file: Path) -> int:
     return found
 
 
-def booted(state: Path) -> subprocess.CompletedProcess[str]:
+def booted(state: Path, own_s: float = 20.0, before: str = "") -> subprocess.CompletedProcess[str]:
     """Run the command that a unit runs at boot. The folder `state` holds the state directories and the
-    YAML files."""
+    YAML files. The code `before` runs first."""
     code = (
-        "import pathlib, sys; from bridges.runtime.all_records import switch_off_all;"
-        f"here = pathlib.Path({str(state)!r});"
-        "sys.exit(switch_off_all(here / 'rmf-bridge', here / 'run', here, 20, 20))"
+        "import os, pathlib, sys; from bridges.runtime.all_records import switch_off_all;"
+        f"here = pathlib.Path({str(state)!r}); {before}\n"
+        f"sys.exit(switch_off_all(here / 'rmf-bridge', here / 'run', here, {own_s}, 20))"
     )
     env = environment()
     return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True)
@@ -86,6 +86,18 @@ def test_a_relay_goes_off_though_another_services_module_never_answers(
     wait_until(lambda: module.relay()[-1:] == [False], "the relay is off")
     assert (done.returncode, answers.exists(), never.exists()) == (1, False, True)
     assert "left_to_its_daemon service=dead_door" in done.stderr
+
+
+def test_a_process_that_cannot_be_ended_keeps_no_other_service_waiting(
+    tmp_path: Path, module: Module
+) -> None:
+    late = tmp_path / "late.yaml"
+    late.write_text(module.yaml.replace(str(port(module.file)), "1") + "\n# its pins: type: gpio\n")
+    answers, never = died(tmp_path, module.file), died(tmp_path, late)
+    refused = "\ndef kill(*_): raise PermissionError\nos.kill = kill"
+    done = booted(tmp_path, own_s=0.0, before=refused)
+    assert (done.returncode, answers.exists(), never.exists()) == (1, False, True)
+    assert "not_killed service=late" in done.stderr
 
 
 @pytest.mark.long(25)

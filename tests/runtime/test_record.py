@@ -1,6 +1,7 @@
 """A record of claimed outputs. The record has all data that a process needs to switch off, even if
 files on the disk change later."""
 
+import errno
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Event
@@ -111,3 +112,65 @@ def test_a_start_has_another_process_switch_off_its_own_devices_unless_one_just_
     predecessor = Predecessor(records, ours, ["sh", "-c", f"touch {started}", "outputs-off"])
     assert predecessor.make_safe(Event().wait) == set(config.devices)
     assert (predecessor.left(), started.exists()) == ([], not tried)
+
+
+TWO_DOORS = """\
+kind: door
+driver: dry_contact
+rmf: {transport: dds}
+buses: {module: {type: modbus, tcp: {host: 127.0.0.1, port: 502}}}
+doors:
+""" + "".join(
+    f"""\
+  {name}:
+    inputs:
+      opened: {{point: unit 1 discrete input {at}, active: high}}
+      closed: {{point: unit 1 discrete input {at + 2}, active: high}}
+    outputs: {{hold_open: {{point: unit 1 coil {at}, active: high}}}}
+"""
+    for at, name in enumerate("ab")
+)
+
+
+def one_off_on_a_worn_card(folder: Path) -> tuple[Records, ClaimRecord, Directories]:
+    """Return the records of a dead daemon whose state directory cannot be written any more. After its
+    death `outputs-off` has switched off only door b."""
+    file = folder / "doors.yaml"
+    file.write_text(TWO_DOORS)
+    config = load(file)
+    places = Directories(folder / "run", folder / "state")
+    places.runtime.mkdir()
+    records, claimed = Records(places), record.of(config)
+    records.write(claimed)
+    (places.state / f".{claimed.name}.new").mkdir()
+    records.still_unsafe(claimed, ["a"], config)
+    (found,) = records.unreleased()
+    assert (found.safe, (places.state / claimed.name).exists()) == (("b",), True)
+    return records, claimed, places
+
+
+def test_a_device_that_was_off_after_one_death_is_switched_off_after_the_next_too(
+    tmp_path: Path,
+) -> None:
+    records, claimed, places = one_off_on_a_worn_card(tmp_path)
+    records.write(claimed)  # the next daemon claims both doors
+    assert records.unreleased() == [claimed]
+    assert list(places.runtime.glob(record.PATTERN)) == []
+
+
+def test_a_record_that_cannot_be_removed_switches_no_device_off_again_until_it_is_claimed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    records, claimed, places = one_off_on_a_worn_card(tmp_path)
+    unlink = Path.unlink
+
+    def refused(path: Path, missing_ok: bool = False) -> None:
+        if path.parent == places.state:
+            raise OSError(errno.EROFS, "Read-only file system", str(path))
+        unlink(path, missing_ok=missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", refused)
+    records.release(claimed)
+    assert (records.unreleased(), (places.state / claimed.name).exists()) == ([], True)
+    records.write(claimed)
+    assert records.unreleased() == [claimed]

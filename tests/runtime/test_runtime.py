@@ -11,6 +11,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from bridges.runtime import runtime_directory
 from bridges.runtime.holder import HOLDER, LockHolder, look, ourselves
 from bridges.runtime.record import ClaimRecord
 from bridges.runtime.runtime_directory import (
@@ -215,6 +216,34 @@ def test_the_runtime_directory_is_the_given_one_or_systemds_or_the_services_or_t
     monkeypatch.setenv("STATE_DIRECTORY", "/var/lib/rmf-bridge/lift")
     assert find(FILE, None).state == Path("/var/lib/rmf-bridge/lift")
     assert find(FILE, "/tmp/here") == in_one(Path("/tmp/here"))
+
+
+def test_a_link_in_the_folder_of_services_that_was_moved_still_finds_the_service(
+    machine: Path,
+) -> None:
+    """A site's release is a link that moves: /etc/rmf-bridges/lift.yaml leads to 41/lift.yaml, and then
+    to 42/lift.yaml."""
+    service = Directories(machine / "run/lift", machine / "var/lift")
+    serving = RuntimeDirectory(service, machine / "41" / "lift.yaml", serves=True)
+    assert find(FILE, None) == service
+    assert find(machine / "42" / "lift.yaml", None) != service
+    with pytest.raises(AlreadyRunning, match="is already running: process"):
+        runtime_directory.held(FILE, None, serves=True)
+    serving.close()
+
+
+def test_a_daemon_by_hand_of_a_services_file_keeps_the_service_from_starting(
+    machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service = Directories(machine / "run/lift", machine / "var/lift")
+    for folder in service.folders:
+        folder.mkdir(mode=0o700, parents=True)
+    by_hand = runtime_directory.held(FILE, None, serves=True)
+    monkeypatch.setenv("RUNTIME_DIRECTORY", str(service.runtime))
+    monkeypatch.setenv("STATE_DIRECTORY", str(service.state))
+    with pytest.raises(AlreadyRunning):
+        runtime_directory.held(FILE, None, serves=True)
+    by_hand.close()
 
 
 def test_after_a_power_cut_only_the_record_shows_the_service(machine: Path) -> None:

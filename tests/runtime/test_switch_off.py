@@ -3,13 +3,18 @@
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.runtime.dead_daemon import ages
 from bridges.runtime.switch_off import outputs_off
+from bridges.settings.config import Config
 from bridges.settings.load import load
 from bridges.system.directories import Directories
+from drivers import Driver
+from drivers.hal import Bus
 from tests.drivers.hal.modbus.module import Module, door
 from tests.runtime.test_silent_units import BUSES, DOOR, YAML
 
@@ -59,6 +64,40 @@ def test_a_frame_that_is_lost_leaves_no_relay_on(module: Module, tmp_path: Path)
     config = load(yaml(module, tmp_path, SILENT + 1))
     assert outputs_off(config, 30.0) == set(config.devices)
     assert module.coils[SILENT + 1, 0] is False
+
+
+@pytest.mark.parametrize(("broken", "first_off"), [("create", False), ("close", True)])
+def test_a_driver_with_a_defect_leaves_no_other_device_of_its_bus_on(
+    module: Module,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    broken: str,
+    first_off: bool,
+) -> None:
+    for unit in (1, 2):
+        door(module, unit)
+        module.coils[unit, 0] = True
+    config = load(yaml(module, tmp_path, 1, 2))
+    real = config.driver_type("door1")
+
+    def defect(*_: object) -> NoReturn:
+        raise KeyError("our own mistake")
+
+    def create(name: str, settings: Any, bus: Bus) -> Driver[Any, Any]:
+        if name != "door1":
+            return real.create(name, settings, bus)
+        if broken == "create":
+            defect()
+        driver = real.create(name, settings, bus)
+        monkeypatch.setattr(driver, broken, defect)
+        return driver
+
+    monkeypatch.setattr(Config, "driver_type", lambda *_: replace(real, create=create))
+    off = {"door1", "door2"} if first_off else {"door2"}
+    assert outputs_off(config, 30.0) == off
+    assert module.coils[2, 0] is False
+    assert "our own mistake" in caplog.text
 
 
 def test_the_dead_daemons_status_says_which_devices_answered_last(tmp_path: Path) -> None:

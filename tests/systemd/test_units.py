@@ -110,6 +110,11 @@ def test_the_unit_without_a_drop_in_permits_no_device() -> None:
     assert "Environment=RMF_BRIDGE_SERVICE=1 RMF_BRIDGE_FITS=nothing PYTHONUNBUFFERED=1" in lines
 
 
+def test_the_command_at_boot_may_end_a_child_that_has_become_a_services_user() -> None:
+    (line,) = re.findall(r"^CapabilityBoundingSet=(.*)$", EARLY.read_text(), re.M)
+    assert line.split() == ["CAP_CHOWN", "CAP_KILL", "CAP_SETGID", "CAP_SETUID"]
+
+
 def test_can_recovers_automatically_after_a_bus_off() -> None:
     network = configparser.ConfigParser()
     network.read(FILES / "80-rmf-can0.network")

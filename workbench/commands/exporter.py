@@ -21,7 +21,7 @@ from bridges.observe.all_devices import PlainGraph
 from bridges.observe.requesters import Moment
 from bridges.observe.tally import SiteTally
 from bridges.runtime import daemons
-from bridges.system import directories, log
+from bridges.system import log
 from bridges.system.certificates import CertificateEnd, CertificateReader
 from bridges.system.installed import how_to_install
 from bridges.system.log import pairs
@@ -166,4 +166,4 @@ class Site:
     def _daemons(self, wall: float) -> Iterator[daemons.DaemonStatus]:
         if self._runtime_dirs is not None:
             return daemons.daemons(sorted(self._runtime_dirs.iterdir()), {}, wall)
-        return daemons.daemons(directories.runtimes(), daemons.units(), wall)
+        return daemons.daemons(daemons.folders(), daemons.units(), wall)

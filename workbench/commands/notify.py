@@ -194,7 +194,7 @@ class Machine:
             self._units = daemons.units()
         if now.at >= self._daemons_at:
             self._daemons_at = now.at + DAEMONS_EVERY_S
-            self._daemons = [*daemons.daemons(directories.runtimes(), self._units, now.wall)]
+            self._daemons = [*daemons.daemons(daemons.folders(), self._units, now.wall)]
             self.known |= {("daemon", printable(one.name)) for one in self._daemons}
         if files_due:
             named = [used for one in self._daemons for used in one.certificates]
