@@ -39,7 +39,7 @@ CHARGER-10. If another node publishes states under this charger's name, the powe
 
 from msgspec.structs import replace
 
-from bridges.kinds.charger import pad, report, session
+from bridges.kinds.charger import pad, report, sensing, session
 from bridges.kinds.charger.memory import (
     ChargerLimits,
     ChargerMemory,
@@ -59,6 +59,7 @@ from bridges.kinds.charger.signals import (
     ChargerSample,
     Event,
 )
+from bridges.kinds.shared.debounce import forget
 from bridges.kinds.shared.decision import (
     Decision,
     IoFailed,
@@ -88,7 +89,8 @@ def decide(
     memory, refused = _take(memory, event, now, limits)
     memory = replace(memory, power=_power(memory, now, limits))
     outputs = ChargerOutputs(memory.power, memory.clear_errors, memory.range_checks)
-    wake_at = memory.rival_at + RIVAL_QUIET_S if rivalled(memory, now) else NEVER
+    changes = memory.rival_at + RIVAL_QUIET_S, sensing.settles_at(memory, limits)
+    wake_at = min((at for at in changes if at > now), default=NEVER)
     return Decision(memory, outputs, report.report(memory, now, limits), wake_at, refused)
 
 
@@ -103,7 +105,7 @@ def _take(
             memory = replace(memory, write_misses=misses, write_failed=True, write_fault=reason)
             return _unordered(memory), ""
         case IoFailed(reason):
-            return replace(memory, misses=memory.misses + 1, io_fault=reason), ""
+            return _missed(memory, reason, limits), ""
         case RivalSeen():
             return replace(memory, rival_at=now), ""
         case OperatorReset():
@@ -125,6 +127,13 @@ def _unordered(memory: ChargerMemory) -> ChargerMemory:
     return replace(memory, clear_by=AGES_AGO) if memory.cleared_at >= read_at else memory
 
 
+def _missed(memory: ChargerMemory, reason: str, limits: ChargerLimits) -> ChargerMemory:
+    """Count a failed poll. The debounce restarts after it."""
+    memory = replace(memory, misses=memory.misses + 1, io_fault=reason)
+    lost = unreachable(memory, limits)
+    return replace(memory, contacts=None if lost else forget(memory.contacts))
+
+
 # ---- a good reading
 
 
@@ -133,6 +142,12 @@ def _sampled(
 ) -> ChargerMemory:
     came = unreachable(memory, limits)
     sample = pad.judged(sample)
+    if limits.debounce:
+        contacts = sensing.settled(memory.contacts, sample, now, limits)
+        memory = replace(memory, contacts=contacts)
+        if contacts.value is None:
+            return memory
+        sample = sensing.as_settled(sample, contacts.value)
     memory = replace(
         memory,
         sample=sample,
@@ -319,6 +334,6 @@ def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | N
         return False
     if holder is None:
         return None if pad.left_alone(memory, limits) else False
-    if pad.not_ready(memory.sample):
+    if pad.not_ready(memory.sample) or sensing.shows_fault(memory):
         return False
     return holder.started or session.cleared_to_start(memory, limits)

@@ -14,6 +14,7 @@ from bridges.kinds.charger.settings import (
     robot,
 )
 from bridges.kinds.charger.signals import ChargeRequested, ChargerSample
+from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.durations import AGES_AGO, RIVAL_QUIET_S
 
 
@@ -21,21 +22,24 @@ class ChargerLimits(msgspec.Struct, frozen=True):
     """The settings of a charger that its core needs. `t`: durations and counts.
 
     A receiver is the part of a robot that takes the power. `receivers` maps a receiver's id to its
-    robot, and is empty if robots are not verified. `can_stop`: the station obeys `power`.
+    robot, and is empty if robots are not verified. `can_stop`: the station obeys `power`. `debounce`:
+    the debounce (s) of each contact; empty for a station without contacts.
     """
 
     t: ChargerDurations = ChargerDurations()
     receivers: Mapping[str, RobotName] = {}
     unrequested: Unrequested = "refuse"
     can_stop: bool = True
+    debounce: Mapping[str, float] = {}
 
     @classmethod
     def of(
         cls, settings: ChargerSettings, debounce: Mapping[str, float] | None = None
     ) -> "ChargerLimits":
-        """Make the limits from the YAML; a charger has no contacts to debounce."""
+        """Make the limits from the YAML and from the debounce (s) of each contact."""
         known = {receiver: robot(text) for receiver, text in settings.receivers.items()}
-        return cls(settings.limits, known, settings.unrequested, settings.can_stop())
+        can_stop = settings.can_stop()
+        return cls(settings.limits, known, settings.unrequested, can_stop, debounce or {})
 
 
 class ChargeSession(msgspec.Struct, frozen=True):
@@ -74,7 +78,8 @@ class ChargerMemory(msgspec.Struct, frozen=True):
     the daemon reached it, and the daemon does not stop that charge. `power`: the power that the core
     last ordered. `disobeyed_since`: the station has charged since this time although `power` is off.
     `protection`: the reason why the station is out of service, "" in service. `clear_by`: a good
-    reading up to this time proves that the errors were cleared.
+    reading up to this time proves that the errors were cleared. `contacts`: the debounced reading of a
+    station on contacts; None while it is not known, and for every other station.
     """
 
     sample: ChargerSample | None = None
@@ -95,6 +100,7 @@ class ChargerMemory(msgspec.Struct, frozen=True):
     cleared_at: float = AGES_AGO
     range_checks: int = 0
     rival_at: float = AGES_AGO
+    contacts: Settled[ChargerSample] | None = None
 
 
 def rivalled(memory: ChargerMemory, now: float) -> bool:
