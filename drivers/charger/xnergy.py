@@ -187,7 +187,7 @@ class Written(Struct, frozen=True):
 
     `range_checks` is the number of range checks that were requested. `asked_at` is the time of the last
     check (monotonic seconds). It is -inf before the first check, and inf while a requested check has
-    not been sent yet.
+    not been sent yet. It is also inf after a check whose write has failed, until the next check.
     """
 
     enabled: bool | None = None
@@ -289,13 +289,17 @@ class Receiver:
         return sample(words, settled(self._written, self._wire.now()))
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Start, stop or check the range, as `steer` decides. Raises DriverError."""
+        """Start, stop or check the range, as `steer` decides. Raises DriverError.
+
+        A check whose write fails is not repeated. The robot then counts as out of range until the next
+        check, because the receiver may still show the result of an earlier one.
+        """
         written, orders = steer(self._written, outputs, self._code, self._wire.now())
         if orders.enable is not None:
             self._enable(orders.enable)
         if orders.check_range:
             self._written = replace(
-                self._written, range_checks=written.range_checks, asked_at=written.asked_at
+                self._written, range_checks=written.range_checks, asked_at=float("inf")
             )
             self._wire.write(CHECK_RANGE, 1)
         self._written = written
