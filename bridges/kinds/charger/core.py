@@ -22,8 +22,10 @@ CHARGER-5. The station is energised only for its assigned robot. That robot must
    waits.
 CHARGER-6. At a fault the core first switches the power off and then reports the fault. Only a new
    request brings power back. A station is out of service (PROTECTION) if it reports a fault, or if it
-   does not stop charging after an order to stop. The state is then ERROR until the errors have been
-   cleared and a good reading follows. A fault of the robot does not take the station out of service.
+   does not stop charging within `stop_timeout_s` of an order to stop. This time begins only when the
+   order was written, and again after `misses` failed polls or failed commands. The state is then ERROR
+   until the errors have been cleared and a good reading follows. A fault of the robot does not take
+   the station out of service.
 CHARGER-7. A failed poll does not show whether the charge goes on. After `misses` failed polls the state
    is ERROR, but the robot and the request stay. Only a good reading ends a request or frees a station.
    An operator can free a silent station after `peer_internal_timeout_s`, because by then it must have
@@ -103,6 +105,8 @@ def _take(
         case WriteFailed(reason):
             misses = memory.write_misses + 1
             memory = replace(memory, write_misses=misses, write_failed=True, write_fault=reason)
+            if misses >= limits.t.misses:
+                memory = replace(memory, disobeyed_since=None)
             return _unordered(memory), ""
         case IoFailed(reason):
             return _missed(memory, reason, limits), ""
@@ -130,8 +134,9 @@ def _unordered(memory: ChargerMemory) -> ChargerMemory:
 def _missed(memory: ChargerMemory, reason: str, limits: ChargerLimits) -> ChargerMemory:
     """Count a failed poll. The debounce restarts after it."""
     memory = replace(memory, misses=memory.misses + 1, io_fault=reason)
-    lost = unreachable(memory, limits)
-    return replace(memory, contacts=None if lost else forget(memory.contacts))
+    if unreachable(memory, limits):
+        return replace(memory, contacts=None, disobeyed_since=None)
+    return replace(memory, contacts=forget(memory.contacts))
 
 
 # ---- a good reading
@@ -140,7 +145,7 @@ def _missed(memory: ChargerMemory, reason: str, limits: ChargerLimits) -> Charge
 def _sampled(
     memory: ChargerMemory, sample: ChargerSample, now: float, limits: ChargerLimits
 ) -> ChargerMemory:
-    came = unreachable(memory, limits)
+    came, written = unreachable(memory, limits), not memory.write_failed
     sample = pad.judged(sample)
     if limits.debounce:
         contacts = sensing.settled(memory.contacts, sample, now, limits)
@@ -162,7 +167,7 @@ def _sampled(
         memory = _held(memory, session.follow(holder, sample, now, limits))
     flows = memory.holder is None and sample.activity in CURRENT_FLOWS
     memory = replace(memory, adopted=flows and (came or memory.adopted))
-    memory = _protected(_watched(memory, now), now, limits)
+    memory = _protected(_watched(memory, written, now), now, limits)
     memory = session.range_checked(_served(memory, now, limits), now, limits)
     if sample.activity is Activity.ERROR and _may_clear(memory, now, limits):
         memory = _clear(memory, now)
@@ -184,14 +189,15 @@ def _with_over(memory: ChargerMemory, request_id: str) -> ChargerMemory:
     return replace(memory, over=over)
 
 
-def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
-    """Note the time since which the station has charged in spite of an order to stop."""
+def _watched(memory: ChargerMemory, written: bool, now: float) -> ChargerMemory:
+    """Note the time since which the station has charged in spite of an order to stop. `written`: no
+    command of the last scan has failed."""
     sample = memory.sample
     charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
     if memory.power is not False or not charges:
         return replace(memory, disobeyed_since=None)
     since = memory.disobeyed_since
-    return replace(memory, disobeyed_since=now if since is None else since)
+    return replace(memory, disobeyed_since=now if since is None and written else since)
 
 
 def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:

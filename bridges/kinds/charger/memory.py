@@ -76,8 +76,8 @@ class ChargerMemory(msgspec.Struct, frozen=True):
     `write_misses`: the number of scans in a row with failed commands. `write_failed`: a command failed
     in this scan. `over`: the ids of the latest ended requests. `adopted`: the station was charging when
     the daemon reached it, and the daemon does not stop that charge. `power`: the power that the core
-    last ordered. `disobeyed_since`: the station has charged since this time although `power` is off.
-    `protection`: the reason why the station is out of service, "" in service. `clear_by`: a good
+    last ordered. `disobeyed_since`: the station has charged since this time although it was told to
+    stop. `protection`: the reason why the station is out of service, "" in service. `clear_by`: a good
     reading up to this time proves that the errors were cleared. `contacts`: the debounced reading of a
     station on contacts; None while it is not known, and for every other station.
     """

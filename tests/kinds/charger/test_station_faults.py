@@ -161,6 +161,37 @@ def test_repeated_failures_of_commands_are_an_error() -> None:
     assert it.told[-1] == (9.0, "CHARGING", "req-1")
 
 
+def test_a_station_that_obeys_after_an_outage_stays_in_service() -> None:
+    it = docked().event(CANCEL_1).event(WriteFailed("timeout"))
+    it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("timeout")).polls("silent 40")
+    it.sees((A.CHARGING, ONE, 1), (A.STOPPING, ONE, 1), (A.IDLE, NOBODY, 3))
+    assert (it.told[-1][1], it.memory.protection) == ("IDLE", "")
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_a_station_whose_stop_was_never_written_stays_in_service(asked: bool) -> None:
+    it = docked().event(CANCEL_1) if asked else story()
+    for _ in range(60):
+        it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("status 500"))
+    it.sees((A.CHARGING, ONE, 1), (A.IDLE, NOBODY, 3))
+    assert (it.told[-1][1], it.memory.protection) == ("IDLE", "")
+
+
+def test_the_stop_has_its_whole_time_from_the_first_order_that_was_written() -> None:
+    it = docked().event(CANCEL_1).event(WriteFailed("status 500"))
+    it.sees((A.CHARGING, ONE, 31))
+    assert it.memory.protection == ""
+    assert it.sees((A.CHARGING, ONE, 1)).memory.protection != ""
+
+
+def test_single_failures_do_not_keep_a_disobedient_station_in_service() -> None:
+    it = docked().event(CANCEL_1)
+    for _ in range(10):
+        it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("status 500"))
+        it.polls("silent 1").sees((A.CHARGING, ONE, 2))
+    assert it.memory.protection != ""
+
+
 # ---- CHARGER-4, CHARGER-7: cancel and unreachable
 
 
