@@ -32,7 +32,8 @@ CHARGER-7. A failed poll does not show whether the charge goes on. After `misses
    switched itself off.
 CHARGER-8. A charge may be under way when the daemon starts, or when it reaches the station again. Such
    a charge is shown and not stopped. The next request takes that charge over only if the request's
-   robot is seen on the pad.
+   robot is seen on the pad. Any other charge without a request is stopped, unless `serve_known` grants
+   the station to the robot that is seen on the pad.
 CHARGER-9. Errors are cleared when an operator orders it. The daemon itself clears errors at most
    `clear_errors_per_h` times an hour.
 CHARGER-10. If another node publishes states under this charger's name, the power is off, no error is

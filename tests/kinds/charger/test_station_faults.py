@@ -15,7 +15,7 @@ from bridges.kinds.charger.signals import (
 )
 from bridges.kinds.shared.decision import Fault, Sampled, WriteFailed
 from bridges.messages.definitions import ChargerStateValue as State
-from tests.kinds.charger.station import NOBODY, ONE, TWO, docked, story
+from tests.kinds.charger.station import NOBODY, ONE, SERVING, TWO, docked, story
 from tests.kinds.charger.story import (
     AMR1,
     AMR2,
@@ -246,8 +246,15 @@ def test_a_charge_that_begins_without_a_request_is_stopped() -> None:
     assert it.powered == [False, False]
     unseen = Story(ChargerLimits(DURATIONS)).polls("idle 1, charging 1")
     assert unseen.outputs.power is False
-    serves = Story(ChargerLimits(DURATIONS, unrequested="serve_known")).polls("idle 1, charging 1")
-    assert serves.outputs.power is None
+
+
+def test_a_station_that_serves_known_robots_stops_a_charge_into_an_empty_pad() -> None:
+    it = story(SERVING).sees((A.CHARGING, NOBODY, 2))
+    assert it.powered == [False, False, False]
+    left = story(SERVING).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1), (A.CHARGING, NOBODY, 2))
+    assert left.powered == [False, True, True, True, True]  # no receiver is told during the charge
+    left.sees((A.IDLE, NOBODY, 4), (A.CHARGING, NOBODY, 1))
+    assert left.powered[5:] == [False] * 5
 
 
 def test_a_charge_that_began_at_a_lost_station_is_adopted() -> None:
