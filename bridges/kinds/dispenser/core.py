@@ -140,8 +140,8 @@ def _cut(memory: WorkcellMemory) -> WorkcellMemory:
 
 
 def _kept(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Note that the phases of all requests are on disk. The time of a new cycle counts from now,
-    because its output `start` comes on only now.
+    """Note that the phases of all requests are on disk. A new cycle begins now, because its output
+    `start` comes on only now. A failure from before has not cut it.
 
     The disk may have taken long. If RMF has stopped repeating the request in the meantime, or if
     something forbids the start now, the cycle does not start, and the request is queued again.
@@ -154,7 +154,7 @@ def _kept(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workcel
     if not (_is_asked(before, now, limits) and _may_start(kept, now, limits)):
         waits = replace(before, phase="queued", kept="running")
         return replace(_put(kept, waits), cycle=None)
-    return replace(kept, cycle=replace(cycle, started_at=now))
+    return replace(kept, cycle=Cycle(cycle.guid, now))
 
 
 def _ask(memory: WorkcellMemory, asked: ItemRequested, now: float, limits: WorkcellLimits) -> Heard:

@@ -178,6 +178,14 @@ def test_a_cycle_whose_start_comes_late_to_the_disk_has_its_whole_pulse_and_time
     assert cell.report.results == (("task", WorkcellStatus.FAILED),)
 
 
+@pytest.mark.parametrize("failure", [WriteFailed("no"), IoFailed("no"), Suspended("slept")])
+def test_a_failure_before_the_start_is_on_disk_does_not_cut_the_cycle(failure: Any) -> None:
+    """DISPENSER-2 and DISPENSER-6: a cycle that is not on disk has not begun."""
+    cell = asked().take(MemoryNotKept("disk full"), failure)
+    cell.take(Sampled(CALM), ASKS, at=12.0).take(MemoryKept())
+    assert cell.outputs == ON
+
+
 def test_a_further_write_to_the_disk_does_not_prolong_the_pulse() -> None:
     cell = running(PULSED)
     cell.take(Sampled(WORKS), replace(ASKS, guid="other"), MemoryKept(), at=10.25)
