@@ -27,7 +27,8 @@ CHARGER-6. At a fault the core first switches the power off and then reports the
    until the errors have been cleared and a good reading follows. A fault of the robot does not take
    the station out of service.
 CHARGER-7. A failed poll does not show whether the charge goes on. After `misses` failed polls the state
-   is ERROR, but the robot and the request stay. Only a good reading ends a request or frees a station.
+   is ERROR, but the robot and the request stay. Only a good reading ends a request, frees a station
+   or begins a charge.
    An operator can free a silent station after `peer_internal_timeout_s`, because by then it must have
    switched itself off.
 CHARGER-8. A charge may be under way when the daemon starts, or when it reaches the station again. Such
@@ -343,4 +344,7 @@ def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | N
         return None if pad.left_alone(memory, limits) else False
     if pad.not_ready(memory.sample) or sensing.shows_fault(memory):
         return False
-    return holder.started or session.cleared_to_start(memory, limits)
+    if holder.started:
+        return True
+    may_begin = memory.power or not memory.misses
+    return bool(may_begin and session.cleared_to_start(memory, limits))

@@ -215,6 +215,19 @@ def test_a_reset_frees_a_lost_station_only_after_its_own_switch_off_time() -> No
     assert never.event(RESET).refused == [(1e6, "the charger does not answer")]
 
 
+def test_a_request_after_a_failed_poll_gets_no_power_before_a_good_reading() -> None:
+    it = story().sees((A.IDLE, ONE, 1)).event(SILENT).event(AMR1)
+    assert it.outputs.power is False
+    assert it.event(SILENT).outputs.power is False
+    assert it.sees((A.IDLE, ONE, 1)).outputs.power is True
+    assert it.event(SILENT).outputs.power is True
+
+
+def test_a_request_after_a_failed_poll_takes_over_an_adopted_charge() -> None:
+    it = Story(FULL).sees((A.CHARGING, ONE, 1)).event(SILENT).event(AMR1)
+    assert it.outputs.power is True
+
+
 # ---- CHARGER-8: restart
 
 
