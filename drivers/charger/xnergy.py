@@ -51,6 +51,9 @@ TICKS_PER_UNIT: Final = 128
 """The scale of voltage and current. The receiver counts in steps of 1/128 V and 1/128 A."""
 
 IDLE: Final = 0
+UNREAD: Final = -1
+"""The driver's own code of a receiver that has not been read, or that was idle before a failed
+reading."""
 CODES: Final[Mapping[int, tuple[Activity, str]]] = {
     IDLE: (Activity.IDLE, "idle"),
     1: (Activity.HANDSHAKE, "handshake 0"),
@@ -272,7 +275,7 @@ class Receiver:
         self._settings = settings
         self._wire = wire
         self._written = Written()
-        self._code = -1
+        self._code = UNREAD
         self._touched = False
 
     def open(self) -> None:
@@ -280,6 +283,8 @@ class Receiver:
 
     def read(self) -> ChargerSample:
         """Read and decode the receiver's numbers. Raises DriverError."""
+        if self._code == IDLE:
+            self._code = UNREAD  # after a failed reading the receiver gets no start
         if self._wire.alive():
             self._written = replace(self._written, enabled=None)
         words = self._wire.read(self._wire.reads)

@@ -192,15 +192,17 @@ def test_a_result_is_the_last_checks_only_a_second_after_it_was_asked_for() -> N
 
 class Wire:
     """A receiver that shows the result "in range" all the time. `lost` is the name of a write that
-    fails."""
+    fails. `silent`: readings fail."""
 
     reads = xnergy.ALWAYS
 
     def __init__(self) -> None:
-        self.time, self.code, self.lost = 0.0, 0, ""
+        self.time, self.code, self.lost, self.silent = 0.0, 0, "", False
         self.written: list[tuple[str, int]] = []
 
     def alive(self) -> bool:
+        if self.silent:
+            raise DriverError("timeout")
         return False
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
@@ -236,3 +238,16 @@ def test_a_check_that_was_not_written_gives_no_result_until_the_next_check() -> 
     assert wire.written == [(xnergy.CHECK_RANGE, 1)] * 2
     wire.time = 61.0
     assert receiver.read().measured.in_range is True
+
+
+def test_no_start_is_written_after_a_failed_reading_but_a_stop_is() -> None:
+    wire = Wire()
+    receiver = xnergy.Receiver(ChargerSettings(), wire)
+    receiver.read()
+    wire.silent = True
+    with pytest.raises(DriverError):
+        receiver.read()
+    receiver.write(ChargerOutputs(power=True))
+    assert wire.written == []
+    receiver.write(ChargerOutputs(power=False))
+    assert wire.written == [(xnergy.ENABLE, 0)]
