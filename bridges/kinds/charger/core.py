@@ -10,8 +10,10 @@ CHARGER-2. A request is granted only in the state IDLE. A repeat of a granted re
    exception: if the station can identify the robot on the pad, a request for that robot may be granted
    (`pad.py`).
 CHARGER-3. `start_timeout` counts from the grant. If no charge starts within this time, the request
-   ends, and the state goes through RELEASED to IDLE. A fault shows the reason, because RMF leaves the
-   error message blank in every state but ERROR.
+   ends, and the state goes through RELEASED to IDLE. If the station loses the robot during the charge
+   and searches for it again, the rest of this time counts on. Only a charge that has lasted for
+   `start_timeout` makes it begin anew. A fault shows the reason, because RMF leaves the error message
+   blank in every state but ERROR.
 CHARGER-4. A cancel ends only the request that the cancel names. If current flows, the power is switched
    off, and the state stays CHARGING until the station has stopped. A full battery ends a request in the
    same way. A cancel may arrive before its request, because they have two topics. The request is

@@ -48,9 +48,10 @@ class ChargeSession(msgspec.Struct, frozen=True):
     `start_by`: the charge must start by this time (monotonic s). `paused_at`: another robot on the pad
     has prevented the start since this time. `checked_at`: the time of the last range check.
     `check_is_void`: the robot has left the pad since then, or the order was not written. `started`:
-    current has flowed for this request. `failed`: the station reported a fault, so this request gets no
-    more power. `ended`: the reason why the request ended. `released_at`: the time at which the robot
-    was disconnected.
+    current has flowed for this request. `flowed_at`: the present or last charge began at this time;
+    None if the daemon did not see it begin. `failed`: the station reported a fault, so this request
+    gets no more power. `ended`: the reason why the request ended. `released_at`: the time at which the
+    robot was disconnected.
     """
 
     request: ChargeRequested
@@ -62,6 +63,7 @@ class ChargeSession(msgspec.Struct, frozen=True):
     failed: bool = False
     ended: Literal["", "start timeout", "cancelled", "full", "left"] = ""
     released_at: float | None = None
+    flowed_at: float | None = None
 
     @property
     def over(self) -> bool:
