@@ -106,12 +106,14 @@ def test_a_failed_reading_restarts_the_debounce() -> None:
 def test_a_bounce_of_the_first_readings_after_a_silence_does_not_count() -> None:
     """A station that was unreachable may have changed, so no earlier reading counts either."""
     it = charging()
-    it.all([SILENT] * 3).shows(charging=False, lasts=0.002).shows(charging=True, lasts=1.0)
+    it.all([SILENT] * 3)
+    it.shows(charging=False, lasts=0.002).shows(charging=True, lasts=1.0)
     assert [line[1:] for line in it.told[-2:]] == [
         ("ERROR", "Charger unreachable"),
         ("CHARGING", "req-1"),
     ]
-    it.all([SILENT] * 3).shows(charging=False, ready=False, lasts=1.0)
+    it.all([SILENT] * 3)
+    it.shows(charging=False, ready=False, lasts=1.0)
     assert it.state == ("RELEASED", "req-1")
 
 
