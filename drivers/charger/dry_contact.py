@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Final
 
 import msgspec
+from msgspec.structs import replace
 
 from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.charger.signals import (
@@ -36,6 +37,9 @@ CUT_MUST_READ: Final = {
 """The reading that a cut wire must give, for each signal (True: asserted). The text names the danger if
 a cut wire reads the opposite."""
 ENABLE: Final = "enable"
+DEBOUNCE_S: Final = 0.05
+FAULT_DEBOUNCE_S: Final = 0.1
+"""The default debounce (s) of the contact `fault`. DEBOUNCE_S is the default of the other contacts."""
 
 
 class ChargerInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -90,7 +94,17 @@ class DryContactChargerSettings(
 def wires(settings: DryContactChargerSettings) -> list[Wire]:
     """Return the wiring table, inputs first."""
     relay = settings.outputs.enable.wire(ENABLE, ("outputs", ENABLE))
-    return [*input_wires(settings.inputs, debounce_s=0.0), relay]
+    return [*map(_debounced, input_wires(settings.inputs)), relay]
+
+
+def _debounced(wire: Wire) -> Wire:
+    default_s = FAULT_DEBOUNCE_S if wire.signal == "fault" else DEBOUNCE_S
+    return wire if wire.debounce_s is not None else replace(wire, debounce_s=default_s)
+
+
+def debounce(settings: DryContactChargerSettings) -> Mapping[str, float]:
+    """Return the debounce (s) of each contact. The keys are the contacts' signals."""
+    return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
 
 
 def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:
@@ -125,9 +139,6 @@ def warnings(settings: DryContactChargerSettings) -> Remarks:
     """Yield a warning, with its path in the YAML, for each valid setting to review before the station
     goes into service."""
     for wire in wires(settings):
-        if wire.debounce_s:
-            text = "contacts of a charger are not debounced: the next scan corrects a bounce"
-            yield (*wire.path, "debounce_s"), f"{text}; delete this key"
         if wire.signal == "charging" and wire.broken_reads() is not True:
             yield (
                 wire.path,
@@ -196,6 +207,7 @@ DRIVER = DriverType(
     buses=("gpio", "modbus", "mqtt"),
     create=create,
     wires=wires,
+    debounce=debounce,
     tables=tables,
     warnings=warnings,
 )

@@ -156,6 +156,7 @@ class RegisterCharger:
         self._orders = orders(settings)
         self._bus = bus
         self._power: bool | None = None
+        self._is_read = False
         self._touched = False
         self._cleared = 0
         self._checked = 0
@@ -165,7 +166,7 @@ class RegisterCharger:
 
     def read(self) -> ChargerSample:
         """Read and decode the station's values. Raises DriverError."""
-        power, self._power = self._power, None
+        power, self._power, self._is_read = self._power, None, False
         command = self._map.power
         shown = [self._orders[POWER]] if command and command.read_back else []
         image = self._bus.cells([*shown, *(p for points in self._cells.values() for p in points)])
@@ -176,11 +177,13 @@ class RegisterCharger:
         self._power = power
         if command and shown:
             self._power = {command.start: True, command.stop: False}.get(image[shown[0]])
+        self._is_read = True
         return decode(self._map, values)
 
     def write(self, outputs: ChargerOutputs) -> None:
         """Write the commands that the outputs need. Write the command that switches the power off
-        before the other commands.
+        before the other commands. After a failed reading do not write the command that switches the
+        power on, because the station may have switched itself off.
 
         `outputs` counts the requests to clear errors, and the requests to check the range. Write the
         command once when its count has changed.
@@ -193,7 +196,7 @@ class RegisterCharger:
         if outputs.range_checks != self._checked:
             self._checked = outputs.range_checks
             self._order("range_check")
-        if outputs.power:
+        if outputs.power and self._is_read:
             self._switch(on=True)
 
     def make_safe(self) -> None:

@@ -51,6 +51,9 @@ TICKS_PER_UNIT: Final = 128
 """The scale of voltage and current. The receiver counts in steps of 1/128 V and 1/128 A."""
 
 IDLE: Final = 0
+UNREAD: Final = -1
+"""The driver's own code of a receiver that has not been read, or that was idle before a failed
+reading."""
 CODES: Final[Mapping[int, tuple[Activity, str]]] = {
     IDLE: (Activity.IDLE, "idle"),
     1: (Activity.HANDSHAKE, "handshake 0"),
@@ -187,7 +190,7 @@ class Written(Struct, frozen=True):
 
     `range_checks` is the number of range checks that were requested. `asked_at` is the time of the last
     check (monotonic seconds). It is -inf before the first check, and inf while a requested check has
-    not been sent yet.
+    not been sent yet. It is also inf after a check whose write has failed, until the next check.
     """
 
     enabled: bool | None = None
@@ -272,7 +275,7 @@ class Receiver:
         self._settings = settings
         self._wire = wire
         self._written = Written()
-        self._code = -1
+        self._code = UNREAD
         self._touched = False
 
     def open(self) -> None:
@@ -280,6 +283,8 @@ class Receiver:
 
     def read(self) -> ChargerSample:
         """Read and decode the receiver's numbers. Raises DriverError."""
+        if self._code == IDLE:
+            self._code = UNREAD  # after a failed reading the receiver gets no start
         if self._wire.alive():
             self._written = replace(self._written, enabled=None)
         words = self._wire.read(self._wire.reads)
@@ -289,13 +294,17 @@ class Receiver:
         return sample(words, settled(self._written, self._wire.now()))
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Start, stop or check the range, as `steer` decides. Raises DriverError."""
+        """Start, stop or check the range, as `steer` decides. Raises DriverError.
+
+        A check whose write fails is not repeated. The robot then counts as out of range until the next
+        check, because the receiver may still show the result of an earlier one.
+        """
         written, orders = steer(self._written, outputs, self._code, self._wire.now())
         if orders.enable is not None:
             self._enable(orders.enable)
         if orders.check_range:
             self._written = replace(
-                self._written, range_checks=written.range_checks, asked_at=written.asked_at
+                self._written, range_checks=written.range_checks, asked_at=float("inf")
             )
             self._wire.write(CHECK_RANGE, 1)
         self._written = written

@@ -10,8 +10,10 @@ CHARGER-2. A request is granted only in the state IDLE. A repeat of a granted re
    exception: if the station can identify the robot on the pad, a request for that robot may be granted
    (`pad.py`).
 CHARGER-3. `start_timeout` counts from the grant. If no charge starts within this time, the request
-   ends, and the state goes through RELEASED to IDLE. A fault shows the reason, because RMF leaves the
-   error message blank in every state but ERROR.
+   ends, and the state goes through RELEASED to IDLE. If the station loses the robot during the charge
+   and searches for it again, the rest of this time counts on. Only a charge that has lasted for
+   `start_timeout` makes it begin anew. A fault shows the reason, because RMF leaves the error message
+   blank in every state but ERROR.
 CHARGER-4. A cancel ends only the request that the cancel names. If current flows, the power is switched
    off, and the state stays CHARGING until the station has stopped. A full battery ends a request in the
    same way. A cancel may arrive before its request, because they have two topics. The request is
@@ -22,15 +24,19 @@ CHARGER-5. The station is energised only for its assigned robot. That robot must
    waits.
 CHARGER-6. At a fault the core first switches the power off and then reports the fault. Only a new
    request brings power back. A station is out of service (PROTECTION) if it reports a fault, or if it
-   does not stop charging after an order to stop. The state is then ERROR until the errors have been
-   cleared and a good reading follows. A fault of the robot does not take the station out of service.
+   does not stop charging within `stop_timeout_s` of an order to stop. This time begins only when the
+   order was written, and again after `misses` failed polls or failed commands. The state is then ERROR
+   until the errors have been cleared and a good reading follows. A fault of the robot does not take
+   the station out of service.
 CHARGER-7. A failed poll does not show whether the charge goes on. After `misses` failed polls the state
-   is ERROR, but the robot and the request stay. Only a good reading ends a request or frees a station.
+   is ERROR, but the robot and the request stay. Only a good reading ends a request, frees a station
+   or begins a charge.
    An operator can free a silent station after `peer_internal_timeout_s`, because by then it must have
    switched itself off.
 CHARGER-8. A charge may be under way when the daemon starts, or when it reaches the station again. Such
    a charge is shown and not stopped. The next request takes that charge over only if the request's
-   robot is seen on the pad.
+   robot is seen on the pad. Any other charge without a request is stopped, unless `serve_known` grants
+   the station to the robot that is seen on the pad.
 CHARGER-9. Errors are cleared when an operator orders it. The daemon itself clears errors at most
    `clear_errors_per_h` times an hour.
 CHARGER-10. If another node publishes states under this charger's name, the power is off, no error is
@@ -39,7 +45,7 @@ CHARGER-10. If another node publishes states under this charger's name, the powe
 
 from msgspec.structs import replace
 
-from bridges.kinds.charger import pad, report, session
+from bridges.kinds.charger import pad, report, sensing, session
 from bridges.kinds.charger.memory import (
     ChargerLimits,
     ChargerMemory,
@@ -59,6 +65,7 @@ from bridges.kinds.charger.signals import (
     ChargerSample,
     Event,
 )
+from bridges.kinds.shared.debounce import forget
 from bridges.kinds.shared.decision import (
     Decision,
     IoFailed,
@@ -88,7 +95,8 @@ def decide(
     memory, refused = _take(memory, event, now, limits)
     memory = replace(memory, power=_power(memory, now, limits))
     outputs = ChargerOutputs(memory.power, memory.clear_errors, memory.range_checks)
-    wake_at = memory.rival_at + RIVAL_QUIET_S if rivalled(memory, now) else NEVER
+    changes = memory.rival_at + RIVAL_QUIET_S, sensing.settles_at(memory, limits)
+    wake_at = min((at for at in changes if at > now), default=NEVER)
     return Decision(memory, outputs, report.report(memory, now, limits), wake_at, refused)
 
 
@@ -101,9 +109,11 @@ def _take(
         case WriteFailed(reason):
             misses = memory.write_misses + 1
             memory = replace(memory, write_misses=misses, write_failed=True, write_fault=reason)
+            if misses >= limits.t.misses:
+                memory = replace(memory, disobeyed_since=None)
             return _unordered(memory), ""
         case IoFailed(reason):
-            return replace(memory, misses=memory.misses + 1, io_fault=reason), ""
+            return _missed(memory, reason, limits), ""
         case RivalSeen():
             return replace(memory, rival_at=now), ""
         case OperatorReset():
@@ -125,14 +135,28 @@ def _unordered(memory: ChargerMemory) -> ChargerMemory:
     return replace(memory, clear_by=AGES_AGO) if memory.cleared_at >= read_at else memory
 
 
+def _missed(memory: ChargerMemory, reason: str, limits: ChargerLimits) -> ChargerMemory:
+    """Count a failed poll. The debounce restarts after it."""
+    memory = replace(memory, misses=memory.misses + 1, io_fault=reason)
+    if unreachable(memory, limits):
+        return replace(memory, contacts=None, disobeyed_since=None)
+    return replace(memory, contacts=forget(memory.contacts))
+
+
 # ---- a good reading
 
 
 def _sampled(
     memory: ChargerMemory, sample: ChargerSample, now: float, limits: ChargerLimits
 ) -> ChargerMemory:
-    came = unreachable(memory, limits)
+    came, written = unreachable(memory, limits), not memory.write_failed
     sample = pad.judged(sample)
+    if limits.debounce:
+        contacts = sensing.settled(memory.contacts, sample, now, limits)
+        memory = replace(memory, contacts=contacts)
+        if contacts.value is None:
+            return memory
+        sample = sensing.as_settled(sample, contacts.value)
     memory = replace(
         memory,
         sample=sample,
@@ -147,7 +171,7 @@ def _sampled(
         memory = _held(memory, session.follow(holder, sample, now, limits))
     flows = memory.holder is None and sample.activity in CURRENT_FLOWS
     memory = replace(memory, adopted=flows and (came or memory.adopted))
-    memory = _protected(_watched(memory, now), now, limits)
+    memory = _protected(_watched(memory, written, now), now, limits)
     memory = session.range_checked(_served(memory, now, limits), now, limits)
     if sample.activity is Activity.ERROR and _may_clear(memory, now, limits):
         memory = _clear(memory, now)
@@ -169,14 +193,15 @@ def _with_over(memory: ChargerMemory, request_id: str) -> ChargerMemory:
     return replace(memory, over=over)
 
 
-def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
-    """Note the time since which the station has charged in spite of an order to stop."""
+def _watched(memory: ChargerMemory, written: bool, now: float) -> ChargerMemory:
+    """Note the time since which the station has charged in spite of an order to stop. `written`: no
+    command of the last scan has failed."""
     sample = memory.sample
     charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
     if memory.power is not False or not charges:
         return replace(memory, disobeyed_since=None)
     since = memory.disobeyed_since
-    return replace(memory, disobeyed_since=now if since is None else since)
+    return replace(memory, disobeyed_since=now if since is None and written else since)
 
 
 def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
@@ -319,6 +344,9 @@ def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | N
         return False
     if holder is None:
         return None if pad.left_alone(memory, limits) else False
-    if pad.not_ready(memory.sample):
+    if pad.not_ready(memory.sample) or sensing.shows_fault(memory):
         return False
-    return holder.started or session.cleared_to_start(memory, limits)
+    if holder.started:
+        return True
+    may_begin = memory.power or not memory.misses
+    return bool(may_begin and session.cleared_to_start(memory, limits))

@@ -166,4 +166,4 @@ def left_alone(memory: ChargerMemory, limits: ChargerLimits) -> bool:
     """Return whether current flows without a request and must not be switched off."""
     if memory.sample is None or memory.sample.activity not in CURRENT_FLOWS:
         return False
-    return memory.adopted or not limits.can_stop or limits.unrequested == "serve_known"
+    return memory.adopted or not limits.can_stop

@@ -11,6 +11,7 @@ from bridges.kinds.charger.signals import (
     ChargeRequested,
     ChargerSample,
 )
+from bridges.kinds.shared.durations import NEVER
 
 RANGE_EVERY_S = 5.0
 """The least time (s) between two range checks (Xnergy RCU: wait 5 s between two checks)."""
@@ -47,7 +48,7 @@ def follow(
         return _beside_another(holder, now, limits)
     holder = _resumed(holder, now)
     if sample.activity in CURRENT_FLOWS:
-        return _flowing(holder, sample, limits)
+        return _flowing(holder, sample, now, limits)
     if sample.activity is Activity.HANDSHAKE and holder.started and not holder.ended:
         holder = _sought_again(holder, now, limits)
     if holder.released_at is not None:
@@ -87,16 +88,26 @@ def _resumed(holder: ChargeSession, now: float) -> ChargeSession:
     return replace(holder, start_by=holder.start_by + now - holder.paused_at, paused_at=None)
 
 
-def _flowing(holder: ChargeSession, sample: ChargerSample, limits: ChargerLimits) -> ChargeSession:
+def _flowing(
+    holder: ChargeSession, sample: ChargerSample, now: float, limits: ChargerLimits
+) -> ChargeSession:
     percent = sample.measured.battery_percent
     full = percent is not None and percent >= limits.t.full_percent and not holder.ended
-    return replace(holder, started=True, released_at=None, ended="full" if full else holder.ended)
+    return replace(
+        holder,
+        started=True,
+        flowed_at=holder.flowed_at if holder.started else now,
+        released_at=None,
+        ended="full" if full else holder.ended,
+    )
 
 
 def _sought_again(holder: ChargeSession, now: float, limits: ChargerLimits) -> ChargeSession:
     """Let the session wait for a new start, because the station has lost the receiver and searches for
-    it again."""
-    by = now + _patience_s(holder.request, limits)
+    it again. After a short charge only the rest of the start timeout is left."""
+    patience_s = _patience_s(holder.request, limits)
+    flowed_s = NEVER if holder.flowed_at is None else now - holder.flowed_at
+    by = now + patience_s if flowed_s >= patience_s else holder.start_by + flowed_s
     return replace(holder, started=False, start_by=by, checked_at=None)
 
 

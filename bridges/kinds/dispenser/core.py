@@ -27,14 +27,18 @@ DISPENSER-7. The outcome is in doubt in these cases: the daemon has died in mid-
    silence. Then the state is OFFLINE, no cycle starts, and the request gets no result until a person
    decides. If the memory is lost, or nothing has been read yet, the state has the stamp 0 and an empty
    queue. RMF ignores a state with the stamp 0.
-DISPENSER-8. A finished request is forgotten a day after RMF's last request for it.
+DISPENSER-8. A request is forgotten a day after RMF's last request for it, unless its cycle runs or its
+   outcome is in doubt. After a restart the day goes on. Of the finished requests about which RMF is
+   silent only the last MOST_CLOSED are remembered.
 """
 
+import itertools
 from typing import Final
 
 from msgspec.structs import replace
 
 from bridges.kinds.dispenser.memory import (
+    SILENCE_STEP_H,
     Cycle,
     Job,
     WorkcellLimits,
@@ -64,7 +68,11 @@ from bridges.kinds.shared.durations import NEVER
 MOST_LISTED: Final = 100
 """The greatest number of listed requests. It is more than the robots of any site. A further request is
 refused."""
+MOST_CLOSED: Final = 1000
+"""The greatest number of remembered requests that are finished and about which RMF is silent. It is
+more than the cycles of a day, so it limits the memory only if requests come without end."""
 REMEMBERED_S: Final = 86400.0
+STEP_S: Final = SILENCE_STEP_H * 3600.0
 
 Heard = tuple[WorkcellMemory, str]
 """The memory after an event, and the reason for a refusal ("" for an obeyed event)."""
@@ -121,7 +129,7 @@ def _hear(memory: WorkcellMemory, event: Event, now: float, limits: WorkcellLimi
         case MemoryNotKept(reason):
             return replace(memory, not_kept=reason), ""
         case DecidedByPerson():
-            return _judge(memory, event)
+            return _judge(memory, event, now)
         case ItemRequested():
             return _ask(memory, event, now, limits)
 
@@ -132,8 +140,8 @@ def _cut(memory: WorkcellMemory) -> WorkcellMemory:
 
 
 def _kept(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Note that the phases of all requests are on disk. The time of a new cycle counts from now,
-    because its output `start` comes on only now.
+    """Note that the phases of all requests are on disk. A new cycle begins now, because its output
+    `start` comes on only now. A failure from before has not cut it.
 
     The disk may have taken long. If RMF has stopped repeating the request in the meantime, or if
     something forbids the start now, the cycle does not start, and the request is queued again.
@@ -146,7 +154,7 @@ def _kept(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workcel
     if not (_is_asked(before, now, limits) and _may_start(kept, now, limits)):
         waits = replace(before, phase="queued", kept="running")
         return replace(_put(kept, waits), cycle=None)
-    return replace(kept, cycle=replace(cycle, started_at=now))
+    return replace(kept, cycle=Cycle(cycle.guid, now))
 
 
 def _ask(memory: WorkcellMemory, asked: ItemRequested, now: float, limits: WorkcellLimits) -> Heard:
@@ -155,7 +163,7 @@ def _ask(memory: WorkcellMemory, asked: ItemRequested, now: float, limits: Workc
         return _new(memory, asked, now)
     if job.item != asked.item and not job.is_over:
         return memory, f"guid of another request: {asked.guid} is for {job.item}"
-    heard = replace(job, asked_at=now, due=True)
+    heard = replace(job, asked_at=now, heard=True, due=True)
     if job.item != asked.item:
         why = f"asked for {asked.item} under the guid of a request for {job.item} ({job.phase})"
         heard = replace(heard, phase="doubtful", item=asked.item, why=why, closed=False)
@@ -180,7 +188,7 @@ def _put(memory: WorkcellMemory, changed: Job) -> WorkcellMemory:
     return replace(memory, jobs=tuple(jobs))
 
 
-def _judge(memory: WorkcellMemory, said: DecidedByPerson) -> Heard:
+def _judge(memory: WorkcellMemory, said: DecidedByPerson, now: float) -> Heard:
     """Apply a person's decision on the outcome of one request in doubt, or of all requests in doubt."""
     named = [job for job in memory.doubtful() if said.request in ("", job.guid)]
     if not named and (said.request or not memory.lost):
@@ -188,20 +196,30 @@ def _judge(memory: WorkcellMemory, said: DecidedByPerson) -> Heard:
     for job in named:
         phase = {"done": "done", "failed": "failed", "again": "queued"}[said.verdict]
         why = "a person has decided so" if said.verdict == "failed" else ""
-        memory = _put(memory, replace(job, phase=phase, why=why, due=True, asked_at=job.asked_at))
+        if job.asked_at is None:
+            job = replace(job, asked_at=now, heard=False)
+        memory = _put(memory, replace(job, phase=phase, why=why, due=True))
     return (memory if said.request else replace(memory, lost="")), ""
 
 
 def _forget(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Mark a finished request as closed if RMF has not repeated it for `repeats_within_s`. Drop a
-    request after a day."""
+    """Count RMF's silence. Mark a finished request as closed if RMF has not repeated it for
+    `repeats_within_s`. Drop a request after a day, and the oldest closed requests above MOST_CLOSED."""
     jobs = []
     for job in memory.jobs:
         silent_s = now - (now if job.asked_at is None else job.asked_at)
-        if silent_s >= REMEMBERED_S and job.phase not in ("running", "doubtful"):
+        lasts = job.phase not in ("running", "doubtful")
+        if silent_s >= REMEMBERED_S and lasts:
             continue
         closes = job.is_over and not job.closed and silent_s >= limits.t.repeats_within_s
-        jobs.append(replace(job, closed=True, due=False) if closes else job)
+        silent_h = int(silent_s // STEP_S) * SILENCE_STEP_H if lasts else 0
+        if closes:
+            job = replace(job, closed=True, due=False)
+        jobs.append(job if job.silent_h == silent_h else replace(job, silent_h=silent_h))
+    excess = sum(job.closed for job in jobs) - MOST_CLOSED
+    if excess > 0:
+        oldest = set(itertools.islice((job.guid for job in jobs if job.closed), excess))
+        jobs = [job for job in jobs if job.guid not in oldest]
     return memory if tuple(jobs) == memory.jobs else replace(memory, jobs=tuple(jobs))
 
 
@@ -261,7 +279,7 @@ def _may_start(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> bo
 
 
 def _is_asked(job: Job, now: float, limits: WorkcellLimits) -> bool:
-    return job.asked_at is not None and now < job.asked_at + limits.t.asked_within_s
+    return job.heard and job.asked_at is not None and now < job.asked_at + limits.t.asked_within_s
 
 
 def _outputs(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellOutputs:

@@ -14,11 +14,13 @@ from bridges.kinds.shared.keep import Text
 from bridges.kinds.shared.kind import Keeping
 
 VERSION: Final = 1
+HOUR_S: Final = 3600.0
 CUT_OFF: Final = "the daemon ended in the middle of the request's cycle"
 
 
 class JobRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Job without its times, because they mean nothing after a restart."""
+    """A Job without its times, because they mean nothing after a restart. `silent_h`: the hours for
+    which RMF had been silent about the request."""
 
     guid: Text
     phase: Phase
@@ -28,6 +30,7 @@ class JobRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     transporter: str = ""
     why: str = ""
     closed: bool = False
+    silent_h: Annotated[int, Meta(ge=0)] = 0
 
 
 class KeptWorkcell(keep.Kept, frozen=True, forbid_unknown_fields=True):
@@ -49,8 +52,9 @@ def restore(kept: bytes, now: float) -> WorkcellMemory:
     """Decode the memory. If a cycle was running, its outcome is unknown. Raises ValueError for bytes
     that `persist` did not make.
 
-    The time for which RMF is silent about a finished request starts again at `now` (monotonic s). The
-    reason is that nobody knows how long the daemon was down.
+    The time for which RMF is silent about a request goes on at `now` (monotonic s) with the hours that
+    were saved. The time for which the daemon was down does not count, because nobody knows it. No
+    request counts as heard, so no cycle starts before RMF repeats its request.
     """
     found = keep.read(kept, KeptWorkcell, VERSION, "the memory of a dispenser or ingestor")
     jobs = tuple(_job(record, now) for record in found.jobs)
@@ -63,7 +67,7 @@ def _record(job: Job) -> JobRecord:
     item = job.item
     return JobRecord(
         job.guid, job.phase, item.type_guid, item.quantity, item.compartment, job.transporter,
-        job.why, job.closed,
+        job.why, job.closed, job.silent_h,
     )  # fmt: skip
 
 
@@ -72,7 +76,15 @@ def _job(record: JobRecord, now: float) -> Job:
     job = Job(record.guid, item, record.transporter, record.phase, record.why, record.phase)
     if record.phase == "running":
         return replace(job, phase="doubtful", why=CUT_OFF)
-    return replace(job, closed=record.closed, asked_at=now if job.is_over else None)
+    if record.phase == "doubtful":
+        return job
+    return replace(
+        job,
+        closed=record.closed,
+        heard=False,
+        silent_h=record.silent_h,
+        asked_at=now - record.silent_h * HOUR_S,
+    )
 
 
 KEEPING: Final[Keeping[WorkcellMemory]] = Keeping(

@@ -19,6 +19,9 @@ Contact = Settled[bool | None]
 DECIDE: Final = "decide: rmf-bridge workcell done, again or failed"
 SHOWN: Final = 3
 """The greatest number of requests in doubt that a fault's text names."""
+SILENCE_STEP_H: Final = 3
+"""The step (h) in which RMF's silence about a request is saved. A shorter step would write to the disk
+more often."""
 Phase = Literal["queued", "running", "done", "failed", "doubtful"]
 """The phases of a request. `doubtful`: only a person can find out the outcome."""
 
@@ -71,8 +74,11 @@ class Job(msgspec.Struct, frozen=True):
     published or switched.
 
     `transporter`: the fleet that asks. `why`: the reason for a failure or a doubt. `asked_at`: the time
-    of RMF's last request. `due`: RMF waits for a result. `closed`: RMF has been silent about a finished
-    request for a long time, so a repeat would be in doubt.
+    since which RMF has been silent about the request. This is the time of RMF's last request, or, if
+    `heard` is False, a time from before this daemon has heard the request. `silent_h`: the hours of
+    this silence, in steps of SILENCE_STEP_H, which count on after a restart. `due`: RMF waits for a
+    result. `closed`: RMF has been silent about a finished request for a long time, so a repeat would be
+    in doubt.
     """
 
     guid: str
@@ -84,6 +90,8 @@ class Job(msgspec.Struct, frozen=True):
     asked_at: float | None = None
     due: bool = False
     closed: bool = False
+    heard: bool = True
+    silent_h: int = 0
 
     @property
     def named(self) -> str:

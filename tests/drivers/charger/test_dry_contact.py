@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from bridges.settings.load import load
-from drivers.charger.dry_contact import tables
+from drivers.charger.dry_contact import debounce, tables, warnings
 
 SETTINGS = load(Path(__file__).parents[3] / "config" / "charger_contacts.yaml").devices["charger_e"]
 
@@ -22,3 +24,11 @@ def test_every_combination_has_its_meaning_and_what_a_cut_makes_of_it() -> None:
         ("charging, ready, fault", "error", "nothing changes"),
     )
     assert outputs.rows == (("enable", "on while a robot may charge"),)
+
+
+def test_each_contact_has_a_debounce_which_the_yaml_may_change() -> None:
+    assert debounce(SETTINGS) == {"charging": 0.05, "ready": 0.05, "fault": 0.1}
+    inputs = replace(SETTINGS.inputs, fault=replace(SETTINGS.inputs.fault, debounce_s=0.3))
+    changed = replace(SETTINGS, inputs=inputs)
+    assert debounce(changed)["fault"] == 0.3
+    assert list(warnings(changed)) == list(warnings(SETTINGS))

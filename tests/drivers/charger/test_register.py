@@ -5,10 +5,12 @@ from typing import Any
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
-from bridges.kinds.charger.signals import Activity, ChargerSample, Measured
+from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.settings.load import load
-from drivers.charger.register import RegisterChargerSettings, decode, tables
+from drivers import DriverError
+from drivers.charger.register import RegisterChargerSettings, create, decode, tables
 from drivers.charger.register_map import ChargerMap, RegisterNumber
 from tests.settings.reading import changed, texts_of
 
@@ -174,3 +176,38 @@ def test_the_table_says_what_each_registers_number_means() -> None:
         ("in_range", "unit 3 discrete input 0", "1", "1"),
         ("coil", "unit 3 input register 5", "0x0001", "1"),
     )
+
+
+class Unit:
+    """A Modbus unit on which every place reads 0. `silent`: readings fail."""
+
+    def __init__(self) -> None:
+        self.silent = False
+        self.written: list[int] = []
+
+    def cells(self, points: Any) -> dict[Any, int]:
+        if self.silent:
+            raise DriverError("timeout")
+        return dict.fromkeys(points, 0)
+
+    def write(self, point: Any, value: int, safe: bool = False) -> None:
+        self.written.append(value)
+
+
+@pytest.mark.parametrize("read_back", [True, False])
+def test_the_power_is_not_switched_on_after_a_failed_reading_but_off(read_back: bool) -> None:
+    found = SETTINGS.map
+    assert found
+    assert found.power
+    power = replace(found.power, read_back=read_back)
+    bus: Any = Unit()
+    driver = create("f", replace(SETTINGS, map=replace(found, power=power)), bus)
+    driver.read()
+    driver.write(ChargerOutputs(True))
+    bus.silent = True
+    with pytest.raises(DriverError):
+        driver.read()
+    driver.write(ChargerOutputs(True))
+    assert bus.written == [1]
+    driver.write(ChargerOutputs(False))
+    assert bus.written == [1, 0]

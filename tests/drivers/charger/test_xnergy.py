@@ -3,15 +3,19 @@
 Every code has a meaning, and every error has a side at fault. Every start orders a range check.
 """
 
+from collections.abc import Iterable
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridges.kinds.charger import core
 from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory
+from bridges.kinds.charger.settings import ChargerSettings
 from bridges.kinds.charger.signals import Activity, ChargerOutputs, ChargerSample, Measured
 from bridges.kinds.shared.decision import Sampled
 from bridges.messages.definitions import ChargerStateValue as State
+from drivers import DriverError
 from drivers.charger import xnergy
 from drivers.charger.xnergy import Orders, Written, settled, steer
 from tests.depth import examples
@@ -184,3 +188,66 @@ def test_a_result_is_the_last_checks_only_a_second_after_it_was_asked_for() -> N
     assert not settled(written, 99.0)
     written, _ = steer(written, ChargerOutputs(range_checks=1), 0, 100.0)
     assert [settled(written, now) for now in (100.5, 101.0)] == [False, True]
+
+
+class Wire:
+    """A receiver that shows the result "in range" all the time. `lost` is the name of a write that
+    fails. `silent`: readings fail."""
+
+    reads = xnergy.ALWAYS
+
+    def __init__(self) -> None:
+        self.time, self.code, self.lost, self.silent = 0.0, 0, "", False
+        self.written: list[tuple[str, int]] = []
+
+    def alive(self) -> bool:
+        if self.silent:
+            raise DriverError("timeout")
+        return False
+
+    def read(self, names: Iterable[str]) -> dict[str, int]:
+        return dict.fromkeys(names, 0) | {"state": self.code, "range": xnergy.IN_RANGE}
+
+    def write(self, name: str, value: int, safe: bool = False) -> None:
+        self.written.append((name, value))
+        if name == self.lost:
+            raise DriverError("timeout")
+
+    def insist(self) -> None:
+        pass
+
+    def now(self) -> float:
+        return self.time
+
+
+def test_a_check_that_was_not_written_gives_no_result_until_the_next_check() -> None:
+    wire = Wire()
+    receiver = xnergy.Receiver(ChargerSettings(), wire)
+    wire.code = 1
+    receiver.read()
+    receiver.write(ChargerOutputs(range_checks=1))  # waits, because the receiver is not idle
+    wire.code, wire.lost = 0, xnergy.CHECK_RANGE
+    receiver.read()
+    with pytest.raises(DriverError):
+        receiver.write(ChargerOutputs(range_checks=1))
+    wire.time, wire.lost = 60.0, ""
+    assert receiver.read().measured.in_range is False
+    receiver.write(ChargerOutputs(range_checks=1))
+    assert wire.written == [(xnergy.CHECK_RANGE, 1)]
+    receiver.write(ChargerOutputs(range_checks=2))
+    assert wire.written == [(xnergy.CHECK_RANGE, 1)] * 2
+    wire.time = 61.0
+    assert receiver.read().measured.in_range is True
+
+
+def test_no_start_is_written_after_a_failed_reading_but_a_stop_is() -> None:
+    wire = Wire()
+    receiver = xnergy.Receiver(ChargerSettings(), wire)
+    receiver.read()
+    wire.silent = True
+    with pytest.raises(DriverError):
+        receiver.read()
+    receiver.write(ChargerOutputs(power=True))
+    assert wire.written == []
+    receiver.write(ChargerOutputs(power=False))
+    assert wire.written == [(xnergy.ENABLE, 0)]

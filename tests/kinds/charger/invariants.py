@@ -87,9 +87,7 @@ def power_has_a_reason(step: Step) -> None:
     if power is None and _sighted(step):
         assert step.seen
         assert step.seen.activity in FLOWS
-        assert (
-            step.ledger.adopted or not step.limits.can_stop or step.limits.unrequested != "refuse"
-        )
+        assert step.ledger.adopted or not step.limits.can_stop
     if _rivalled(step) or step.ledger.out:
         assert power is False
 

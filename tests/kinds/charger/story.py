@@ -68,7 +68,7 @@ class Story:
     """The charger's core with its memory, in virtual time.
 
     `told` gets an entry (s, state, request id or error) at each change. `powered` gets the core's order
-    for the power after each reading by `sees`.
+    for the power after each reading by `sees`. `wakes` is the time (s) for which the core asked last.
     """
 
     limits: ChargerLimits = LIMITS
@@ -80,12 +80,13 @@ class Story:
     report: ChargerReport | None = None
     outputs: ChargerOutputs = field(default_factory=ChargerOutputs)
     powered: list[bool | None] = field(default_factory=list)
+    wakes: float = 0.0
 
     def event(self, event: Event) -> "Story":
         """Let the core decide on an event now."""
         decision = core.decide(self.memory, event, self.now, self.limits)
         self.memory, self.outputs, self.report = decision.memory, decision.outputs, decision.report
-        shown = decision.report
+        self.wakes, shown = decision.wake_at, decision.report
         state = shown.state.name.removeprefix("CHARGER_")
         line = (state, shown.error_message or shown.request_id)
         if not self.told or self.told[-1][1:] != line:

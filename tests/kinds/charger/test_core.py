@@ -209,16 +209,16 @@ def test_a_charge_that_has_started_has_no_timeout() -> None:
     assert story.told[-1] == (1.0, "CHARGING", "req-1")
 
 
-def test_a_coupling_that_is_lost_and_sought_again_gets_its_whole_start_timeout() -> None:
-    story = Story().polls("idle 1").event(AMR1).polls("charging 100, handshake 59, charging 1")
+def test_a_coupling_that_is_lost_after_a_long_charge_gets_its_whole_start_timeout() -> None:
+    story = Story().polls("idle 1").event(AMR1).polls("charging 100, handshake 59, charging 60")
     story.polls("handshake 61, idle 3")
     assert story.told[2:] == [
         (1.0, "CHARGING", "req-1"),
         (101.0, "ASSIGNED", "req-1"),
         (160.0, "CHARGING", "req-1"),
-        (161.0, "ASSIGNED", "req-1"),
-        (221.0, "RELEASED", "req-1"),
-        (223.0, "IDLE", ""),
+        (220.0, "ASSIGNED", "req-1"),
+        (280.0, "RELEASED", "req-1"),
+        (282.0, "IDLE", ""),
     ]
 
 

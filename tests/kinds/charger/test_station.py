@@ -188,6 +188,23 @@ def test_the_start_timeout_of_an_ad_hoc_request_counts_from_its_acceptance() -> 
     assert it.faults[-1] == "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
 
 
+def test_a_charge_that_breaks_off_again_and_again_ends_at_the_start_timeout() -> None:
+    it = story().event(AMR1).sees((A.HANDSHAKE, ONE, 1))  # the start timeout is 60 s
+    for _ in range(5):
+        it.sees((A.CHARGING, ONE, 1), (A.HANDSHAKE, ONE, 10))
+    assert it.told[-1][1] == "ASSIGNED"
+    it.sees((A.CHARGING, ONE, 1), (A.HANDSHAKE, ONE, 10))
+    assert it.told[-1][1:] == ("RELEASED", "req-1")
+    assert it.faults == ["START_TIMEOUT: tiny/AMR01 did not start to charge in time"]
+
+
+def test_after_a_long_charge_a_robot_that_is_sought_again_has_the_whole_start_timeout() -> None:
+    it = story().event(AMR1).sees((A.HANDSHAKE, ONE, 50), (A.CHARGING, ONE, 60))
+    it.sees((A.HANDSHAKE, ONE, 60))
+    assert it.told[-1][1] == "ASSIGNED"
+    assert it.sees((A.HANDSHAKE, ONE, 1)).told[-1][1] == "RELEASED"
+
+
 def test_with_the_setting_a_known_robot_is_charged_without_a_request() -> None:
     serves = replace(FULL, unrequested="serve_known")
     it = story(serves).sees((A.IDLE, ONE, 1), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 2))

@@ -15,7 +15,7 @@ from bridges.kinds.charger.signals import (
 )
 from bridges.kinds.shared.decision import Fault, Sampled, WriteFailed
 from bridges.messages.definitions import ChargerStateValue as State
-from tests.kinds.charger.station import NOBODY, ONE, TWO, docked, story
+from tests.kinds.charger.station import NOBODY, ONE, SERVING, TWO, docked, story
 from tests.kinds.charger.story import (
     AMR1,
     AMR2,
@@ -161,6 +161,37 @@ def test_repeated_failures_of_commands_are_an_error() -> None:
     assert it.told[-1] == (9.0, "CHARGING", "req-1")
 
 
+def test_a_station_that_obeys_after_an_outage_stays_in_service() -> None:
+    it = docked().event(CANCEL_1).event(WriteFailed("timeout"))
+    it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("timeout")).polls("silent 40")
+    it.sees((A.CHARGING, ONE, 1), (A.STOPPING, ONE, 1), (A.IDLE, NOBODY, 3))
+    assert (it.told[-1][1], it.memory.protection) == ("IDLE", "")
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_a_station_whose_stop_was_never_written_stays_in_service(asked: bool) -> None:
+    it = docked().event(CANCEL_1) if asked else story()
+    for _ in range(60):
+        it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("status 500"))
+    it.sees((A.CHARGING, ONE, 1), (A.IDLE, NOBODY, 3))
+    assert (it.told[-1][1], it.memory.protection) == ("IDLE", "")
+
+
+def test_the_stop_has_its_whole_time_from_the_first_order_that_was_written() -> None:
+    it = docked().event(CANCEL_1).event(WriteFailed("status 500"))
+    it.sees((A.CHARGING, ONE, 31))
+    assert it.memory.protection == ""
+    assert it.sees((A.CHARGING, ONE, 1)).memory.protection != ""
+
+
+def test_single_failures_do_not_keep_a_disobedient_station_in_service() -> None:
+    it = docked().event(CANCEL_1)
+    for _ in range(10):
+        it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("status 500"))
+        it.polls("silent 1").sees((A.CHARGING, ONE, 2))
+    assert it.memory.protection != ""
+
+
 # ---- CHARGER-4, CHARGER-7: cancel and unreachable
 
 
@@ -182,6 +213,19 @@ def test_a_reset_frees_a_lost_station_only_after_its_own_switch_off_time() -> No
     never = story().event(AMR1).sees((A.CHARGING, ONE, 1)).all([SILENT] * 3)
     never.now = 1e6
     assert never.event(RESET).refused == [(1e6, "the charger does not answer")]
+
+
+def test_a_request_after_a_failed_poll_gets_no_power_before_a_good_reading() -> None:
+    it = story().sees((A.IDLE, ONE, 1)).event(SILENT).event(AMR1)
+    assert it.outputs.power is False
+    assert it.event(SILENT).outputs.power is False
+    assert it.sees((A.IDLE, ONE, 1)).outputs.power is True
+    assert it.event(SILENT).outputs.power is True
+
+
+def test_a_request_after_a_failed_poll_takes_over_an_adopted_charge() -> None:
+    it = Story(FULL).sees((A.CHARGING, ONE, 1)).event(SILENT).event(AMR1)
+    assert it.outputs.power is True
 
 
 # ---- CHARGER-8: restart
@@ -215,8 +259,15 @@ def test_a_charge_that_begins_without_a_request_is_stopped() -> None:
     assert it.powered == [False, False]
     unseen = Story(ChargerLimits(DURATIONS)).polls("idle 1, charging 1")
     assert unseen.outputs.power is False
-    serves = Story(ChargerLimits(DURATIONS, unrequested="serve_known")).polls("idle 1, charging 1")
-    assert serves.outputs.power is None
+
+
+def test_a_station_that_serves_known_robots_stops_a_charge_into_an_empty_pad() -> None:
+    it = story(SERVING).sees((A.CHARGING, NOBODY, 2))
+    assert it.powered == [False, False, False]
+    left = story(SERVING).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1), (A.CHARGING, NOBODY, 2))
+    assert left.powered == [False, True, True, True, True]  # no receiver is told during the charge
+    left.sees((A.IDLE, NOBODY, 4), (A.CHARGING, NOBODY, 1))
+    assert left.powered[5:] == [False] * 5
 
 
 def test_a_charge_that_began_at_a_lost_station_is_adopted() -> None:

@@ -285,6 +285,7 @@ def alike(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMe
             start_by=max(holder.start_by - now, -1.0),
             paused_at=_at(holder.paused_at, now),
             checked_at=_at(holder.checked_at, now, 8.0),
+            flowed_at=_at(holder.flowed_at, now, limits.t.start_timeout_s),
             released_at=_at(holder.released_at, now, limits.t.released_s),
         )
     return replace(

@@ -178,6 +178,14 @@ def test_a_cycle_whose_start_comes_late_to_the_disk_has_its_whole_pulse_and_time
     assert cell.report.results == (("task", WorkcellStatus.FAILED),)
 
 
+@pytest.mark.parametrize("failure", [WriteFailed("no"), IoFailed("no"), Suspended("slept")])
+def test_a_failure_before_the_start_is_on_disk_does_not_cut_the_cycle(failure: Any) -> None:
+    """DISPENSER-2 and DISPENSER-6: a cycle that is not on disk has not begun."""
+    cell = asked().take(MemoryNotKept("disk full"), failure)
+    cell.take(Sampled(CALM), ASKS, at=12.0).take(MemoryKept())
+    assert cell.outputs == ON
+
+
 def test_a_further_write_to_the_disk_does_not_prolong_the_pulse() -> None:
     cell = running(PULSED)
     cell.take(Sampled(WORKS), replace(ASKS, guid="other"), MemoryKept(), at=10.25)
@@ -236,13 +244,23 @@ def test_a_failure_halts_until_a_reset_and_no_longer() -> None:
 
 def test_a_restart_keeps_every_request_the_halt_and_the_lost_memory() -> None:
     item = Item("box", 3, "left")
-    failed = Job("a", item, "fleet", "failed", "it jams", kept="failed", closed=True)
+    failed = Job("a", item, "fleet", "failed", "it jams", "failed", closed=True, silent_h=6)
     waits = Job("b", item, "other", "queued", kept="queued")
     before = WorkcellMemory(
         jobs=(failed, waits), halted="a has failed: it jams", lost="a full disk"
     )
     after = restore(persist(before), 7.0)
-    assert after == replace(before, jobs=(replace(failed, asked_at=7.0), waits))
+    silent = replace(failed, asked_at=7.0 - 6 * 3600.0, heard=False)
+    asked_for = replace(waits, asked_at=7.0, heard=False)
+    assert after == replace(before, jobs=(silent, asked_for))
+
+
+def test_a_memory_of_an_earlier_version_has_no_silence() -> None:
+    kept = persist(WorkcellMemory(jobs=(Job("a", kept="queued", silent_h=6),)))
+    earlier = kept.replace(b',"silent_h":6', b"")
+    assert earlier != kept
+    [job] = restore(earlier, 7.0).jobs
+    assert (job.silent_h, job.asked_at) == (0, 7.0)
 
 
 def test_one_request_twice_in_the_memory_is_refused() -> None:
@@ -358,6 +376,68 @@ def test_a_finished_request_is_closed_after_silence_and_forgotten_after_a_day() 
             (now >= 300.0 and closed.get(guid, False), now < 300.0 or guid not in closed)
             for guid in known
         ]
+
+
+# ---- DISPENSER-8: requests that RMF has given up, over restarts
+
+
+def restarted(cell: Cell) -> Cell:
+    """Return the dispenser after a restart of its machine. The monotonic clock starts again."""
+    new = Cell(cell.limits)
+    new.memory = restore(persist(cell.memory), 0.0)
+    return new.take(Sampled(CALM))
+
+
+def test_requests_that_rmf_has_given_up_do_not_fill_the_queue_over_nightly_restarts() -> None:
+    cell, never = Cell(), replace(CALM, ready=False)
+    for day in range(130):
+        cell.take(Sampled(never), replace(ASKS, guid=f"t{day}"), MemoryKept(), at=10.0)
+        assert cell.refused == ""
+        cell.take(Sampled(never), at=86_000.0)
+        cell = restarted(cell)
+    assert [job.guid for job in cell.memory.jobs] == ["t129"]
+
+
+@pytest.mark.parametrize("phase", ["queued", "done", "failed"])
+def test_the_day_of_a_silent_request_goes_on_after_restarts(phase: Any) -> None:
+    cell = Cell().take(Sampled(CALM), at=0.0)
+    cell.memory = replace(cell.memory, jobs=(Job("a", BOX, phase=phase, kept=phase, asked_at=0.0),))
+    for _ in range(3):
+        cell = restarted(cell.take(Sampled(CALM), at=7 * 3600.0))  # 6 h of each 7 h are saved
+    cell.take(Sampled(CALM), at=6 * 3600.0 - 1)
+    assert len(cell.memory.jobs) == 1
+    assert cell.take(Sampled(CALM), at=6 * 3600.0).memory.jobs == ()
+
+
+def test_a_request_from_before_a_restart_does_not_start_until_rmf_repeats_it() -> None:
+    cell = restarted(Cell().take(Sampled(replace(CALM, ready=False)), ASKS, MemoryKept()))
+    cell.take(MemoryKept(), MemoryKept())
+    assert (cell.outputs, cell.report.queue) == (WorkcellOutputs(), ("task",))
+    assert cell.take(ASKS, MemoryKept(), MemoryKept()).outputs == ON
+
+
+def test_a_silence_that_rmf_ends_counts_no_more() -> None:
+    cell = Cell().take(Sampled(replace(CALM, ready=False)), ASKS, MemoryKept(), at=0.0)
+    assert cell.take(Sampled(CALM), at=4 * 3600.0).memory.jobs[0].silent_h == 3
+    assert cell.take(ASKS).memory.jobs[0].silent_h == 0
+
+
+@pytest.mark.parametrize("verdict", ["done", "failed", "again"])
+def test_a_request_that_a_person_decided_after_a_restart_is_forgotten_too(verdict: Any) -> None:
+    cell = restarted(running()).take(DecidedByPerson(verdict, ""), MemoryKept(), at=10.0)
+    assert cell.outputs == WorkcellOutputs()
+    assert cell.take(Sampled(CALM), at=86_410.0).memory.jobs == ()
+
+
+def test_of_the_finished_requests_the_last_thousand_are_remembered() -> None:
+    jobs = [Job(f"t{n}", phase="done", kept="done", asked_at=0.0) for n in range(core.MOST_CLOSED)]
+    cell = Cell().take(Sampled(CALM), at=300.0)
+    cell.memory = replace(cell.memory, jobs=(*jobs, Job("last", phase="done", asked_at=0.0)))
+    cell.take(Sampled(CALM))
+    assert [job.guid for job in cell.memory.jobs] == [*(job.guid for job in jobs[1:]), "last"]
+
+
+# ---- the times at which the core decides again
 
 
 def test_the_core_wakes_for_each_of_its_time_limits() -> None:
