@@ -26,8 +26,9 @@ def is_loopback(host: str) -> bool:
 
 def one_spelling(host: str) -> str:
     """Return a host's name or address as it is compared with others: a name in lower case without a
-    final dot, the address 127.0.0.1 for this machine, and any other address in its shortest form."""
-    if is_loopback(name := host.lower().rstrip(".")):
+    final dot, 127.0.0.1 for `localhost`, and an address in its shortest form."""
+    name = host.lower().rstrip(".")
+    if name == "localhost":
         return "127.0.0.1"
     try:
         return str(ipaddress.ip_address(name))
