@@ -29,7 +29,7 @@ from typing import Final
 from msgspec.structs import replace
 
 from bridges.runtime import drop_in
-from bridges.runtime.daemons import by_hand
+from bridges.runtime.daemons import persons_daemons
 from bridges.runtime.runtime_directory import in_use
 from bridges.runtime.services import (
     CONFIG,
@@ -131,7 +131,7 @@ def runs_by_hand(config: Config) -> str:
     Return "" if this user sees no such daemon. A user other than root does not see the daemons of other
     users, and nobody sees a daemon with `--runtime-dir`."""
     files = {named(config.path), named(SERVICE_FILES / f"{config.path.stem}.yaml")}
-    return next((in_use(*found) for found in by_hand(files)), "")
+    return next((in_use(*found) for found in persons_daemons(files)), "")
 
 
 def groups(root: Path) -> set[str]:

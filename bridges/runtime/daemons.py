@@ -145,7 +145,7 @@ def folders() -> Iterator[Path]:
         yield from sorted(left.difference(found))
 
 
-def by_hand(files: Container[str]) -> Iterator[tuple[Path, LockHolder]]:
+def persons_daemons(files: Container[str]) -> Iterator[tuple[Path, LockHolder]]:
     """Yield the living daemons that this user sees and that a person started by hand for one of these
     files. `files`: canonical paths. Yield each daemon with its runtime directory. Leave out
     simulations, which use no hardware."""

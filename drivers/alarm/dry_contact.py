@@ -19,7 +19,7 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.alarm.sources import PURPOSE, drill_problems
 from drivers.driver_type import DriverType
-from drivers.hal.points import Input, Points, PointsBus, Wire, is_number
+from drivers.hal.points import Input, Points, PointsBus, Wire, debounces, is_number
 from drivers.on_points import OnPoints
 from drivers.unsafe import Unsafe, cut_must_read, needlessly_accepted, slow_alarms, unaccepted
 
@@ -62,7 +62,7 @@ def _unsafe(settings: DryContactPanelSettings) -> Iterator[Unsafe]:
 
 def debounce(settings: DryContactPanelSettings) -> Mapping[str, float]:
     """Return the debounce time of each input (s), by signal."""
-    return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
+    return debounces(wires(settings))
 
 
 def warnings(settings: DryContactPanelSettings) -> Remarks:

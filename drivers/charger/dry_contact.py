@@ -23,7 +23,7 @@ from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
-from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
+from drivers.hal.points import Input, Output, Points, PointsBus, Wire, debounces, input_wires
 from drivers.on_points import OnPoints
 from drivers.tables import lines_on, one_cut, told_of_cuts
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
@@ -104,7 +104,7 @@ def _debounced(wire: Wire) -> Wire:
 
 def debounce(settings: DryContactChargerSettings) -> Mapping[str, float]:
     """Return the debounce (s) of each contact. The keys are the contacts' signals."""
-    return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
+    return debounces(wires(settings))
 
 
 def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:

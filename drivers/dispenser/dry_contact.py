@@ -17,7 +17,7 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.driver_type import DriverType
-from drivers.hal.points import Input, Output, Points, PointsBus, Wire, input_wires
+from drivers.hal.points import Input, Output, Points, PointsBus, Wire, debounces, input_wires
 from drivers.on_points import OnPoints
 from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 
@@ -98,7 +98,7 @@ def wires(settings: DryContactWorkcellSettings) -> list[Wire]:
 
 def debounce(settings: DryContactWorkcellSettings) -> Mapping[str, float]:
     """Return the debounce time (s) of each input. The keys are the inputs' signals."""
-    return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
+    return debounces(wires(settings))
 
 
 def warnings(settings: DryContactWorkcellSettings) -> Remarks:

@@ -24,7 +24,17 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.kinds.shared.table import Table
 from drivers.door.closing import CLOSING
 from drivers.driver_type import DriverType
-from drivers.hal.points import Flash, Input, Output, Point, Points, PointsBus, Wire, input_wires
+from drivers.hal.points import (
+    Flash,
+    Input,
+    Output,
+    Point,
+    Points,
+    PointsBus,
+    Wire,
+    debounces,
+    input_wires,
+)
 from drivers.on_points import OnPoints
 from drivers.unsafe import Unsafe, needlessly_accepted, slow_alarms, unaccepted, unsafe_wires
 
@@ -135,7 +145,7 @@ def wires(settings: DryContactDoorSettings) -> list[Wire]:
 
 def debounce(settings: DryContactDoorSettings) -> Mapping[str, float]:
     """Return the debounce time (s) of each input. The keys are the inputs' signals."""
-    return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
+    return debounces(wires(settings))
 
 
 def tables(settings: DryContactDoorSettings) -> Iterator[Table]:

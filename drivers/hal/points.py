@@ -156,6 +156,11 @@ class Wire(msgspec.Struct, frozen=True):
         return self.asserted(self.pull == "up")
 
 
+def debounces(wires: Iterable[Wire]) -> dict[str, float]:
+    """Return the debounce (s) of each input, by signal."""
+    return {wire.signal: wire.debounce_s for wire in wires if wire.debounce_s is not None}
+
+
 def is_number(wires: Iterable[Wire]) -> bool:
     """Return whether these lines are bits of registers. Such bits form a number inside a controller,
     and have no cable that somebody could cut."""

@@ -105,20 +105,23 @@ def test_a_file_that_the_new_version_refuses_leaves_everything_as_it_was(
     assert is_complete(made, TWO)
 
 
+def left_on(made: System) -> str:
+    """Leave a record of the door's outputs. Return the line that the package's scripts must print."""
+    record = made.root / "var/lib/rmf-bridge/door/claimed-1.json"
+    record.parent.mkdir()
+    record.touch()
+    return f"door: not verified off: cut its relays' supply before anybody works on it ({record})\n"
+
+
 def test_a_failed_service_and_an_unverified_output_are_named_and_the_others_serve(
     tmp_path: Path, debs: dict[str, Path]
 ) -> None:
     made = system(tmp_path, debs[ONE])
-    record = made.root / "var/lib/rmf-bridge/door/claimed-1.json"
-    record.parent.mkdir()
-    record.touch()
+    told_of = left_on(made)
     (made.fakes / "absent/rmf-bridge@failed.service").touch()
     told = made.dpkg("-i", debs[TWO])
     assert told.returncode == 0
-    assert (
-        f"door: not verified off: cut its relays' supply before anybody works on it ({record})"
-        in told.stderr
-    )
+    assert told_of in told.stderr
     assert "rmf-bridge@failed.service does not serve" in told.stderr
     assert made.states() == {**SERVED, "failed": "failed"}
     # The old version's tree stays until every service has served.
@@ -171,11 +174,8 @@ def test_a_removal_and_a_purge_name_each_service_that_is_not_verified_off(
     tmp_path: Path, debs: dict[str, Path]
 ) -> None:
     made = system(tmp_path, debs[ONE])
-    record = made.root / "var/lib/rmf-bridge/door/claimed-1.json"
-    record.parent.mkdir()
-    record.touch()
-    told = f"door: not verified off: cut its relays' supply before anybody works on it ({record})\n"
+    told = left_on(made)
     for words in ("-r", "-P"):
         done = made.dpkg(words, "rmf-bridges")
         assert (done.returncode, done.stderr.count(told)) == (0, 1)
-    assert not record.parent.parent.exists()
+    assert not (made.root / "var/lib/rmf-bridge").exists()

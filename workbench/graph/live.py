@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Final
@@ -60,6 +61,12 @@ def subscribed(
     return ends
 
 
+def require_life(transport: Transport) -> None:
+    """Raise TransportError if the transport's thread has ended. No more messages would come."""
+    if not transport.lives:
+        raise TransportError("the transport's thread has ended")
+
+
 class Ear:
     """A listener that hears these topics from now on. With `others_only`, it does not hear the messages
     that its own transport sends. `ends` is topic -> subscription."""
@@ -91,12 +98,11 @@ class Ear:
         Raises TransportError after the last message of a transport whose thread has ended. Otherwise
         the graph would seem to be silent.
         """
-        heard = []
-        try:
+        heard = list[Heard]()
+        with suppress(Empty):
             heard.append(self._waiting.get(timeout=max(0.0, timeout_s)))
             while True:
                 heard.append(self._waiting.get_nowait())
-        except Empty:
-            if not heard and not self._transport.lives:
-                raise TransportError("the transport's thread has ended") from None
-            return heard
+        if not heard:
+            require_life(self._transport)
+        return heard

@@ -15,7 +15,7 @@ from bridges.messages.heard import Heard, Sender, bounded
 from bridges.messages.topics import AnyTopic
 from bridges.system.log import pairs
 from bridges.transports.transport import Transport, TransportError
-from workbench.graph.live import subscribed
+from workbench.graph.live import require_life, subscribed
 from workbench.page.live_site import HEARD, LiveSite
 
 log = logging.getLogger(__name__)
@@ -87,8 +87,7 @@ class Listener:
 
     def _stay(self, transport: Transport) -> None:
         while not self._ended.wait(1.0):
-            if not transport.lives:
-                raise TransportError("the transport's thread has ended")
+            require_life(transport)
             if found := transport.faults():
                 self.trouble = "; ".join(f"{code}: {detail}" for code, detail in found)
             else:

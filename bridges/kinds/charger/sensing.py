@@ -56,7 +56,7 @@ def as_settled(sample: ChargerSample, accepted: ChargerSample) -> ChargerSample:
 
 
 def shows_fault(memory: ChargerMemory) -> bool:
-    """Return whether the newest reading shows a fault, even one that does not count yet."""
+    """Return whether the newest reading shows a fault. The debounce of the fault does not matter."""
     return memory.contacts is not None and memory.contacts.candidate.activity in AT_FAULT
 
 

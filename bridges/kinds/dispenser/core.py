@@ -208,11 +208,11 @@ def _forget(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workc
     jobs = []
     for job in memory.jobs:
         silent_s = now - (now if job.asked_at is None else job.asked_at)
-        lasts = job.phase not in ("running", "doubtful")
-        if silent_s >= REMEMBERED_S and lasts:
+        may_go = job.phase not in ("running", "doubtful")
+        if silent_s >= REMEMBERED_S and may_go:
             continue
         closes = job.is_over and not job.closed and silent_s >= limits.t.repeats_within_s
-        silent_h = int(silent_s // STEP_S) * SILENCE_STEP_H if lasts else 0
+        silent_h = int(silent_s // STEP_S) * SILENCE_STEP_H if may_go else 0
         if closes:
             job = replace(job, closed=True, due=False)
         jobs.append(job if job.silent_h == silent_h else replace(job, silent_h=silent_h))

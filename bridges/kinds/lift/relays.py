@@ -36,8 +36,9 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
         been off for long enough, and until `ready_at`. A change to another output of the group waits
         too."""
         if self.on is not None:
-            off = replace(self, on=None, off_at=now, written=False)
-            return self if wanted == self.on else off
+            if wanted == self.on:
+                return self
+            return replace(self, on=None, off_at=now, written=False)
         if wanted is None or now < self.may_switch_on_at(now, ready_at, t):
             return self
         return Channel(wanted, self.off_at, (*self.recent(now), now), written=False)

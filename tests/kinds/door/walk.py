@@ -8,7 +8,7 @@ as one state. All durations are sums of powers of two, so no time is rounded.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -363,7 +363,7 @@ def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
             read_at=_at(senses.read_at, by, t.stale_after_s),
             linked_since=_at(senses.linked_since, by, t.travel_s),
         ),
-        pulses=None if memory.pulses is None else _pulses(memory.pulses, by, limits),
+        pulses=memory.pulses and _shifted_pulse(memory.pulses, by, limits, "good_since"),
     )
 
 
@@ -375,7 +375,7 @@ def _shifted(ledger: Ledger, by: float, limits: DoorLimits) -> Ledger:
         rival_at=_at(ledger.rival_at, by, RIVAL_QUIET_S),
         sure_since=_at(ledger.sure_since, by, limits.t.travel_s),
         unlike=tuple(_at(since, by, limits.t.hazard_clear_s) for since in ledger.unlike),
-        pulse=None if ledger.pulse is None else _pulse_seen(ledger.pulse, by, limits),
+        pulse=ledger.pulse and _shifted_pulse(ledger.pulse, by, limits, "row_since"),
     )
 
 
@@ -384,23 +384,17 @@ def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
     return None if at is None else max(at + by, -oldest_s)
 
 
-def _pulses(pulses: DoorPulses, by: float, limits: DoorLimits) -> DoorPulses:
-    return replace(
-        pulses,
-        at=pulses.at + by,
-        off_at=_at(pulses.off_at, by),
-        failed_at=_at(pulses.failed_at, by),
-        good_since=_at(pulses.good_since, by, limits.t.travel_s),
-    )
+P = TypeVar("P", DoorPulses, PulseSeen)
 
 
-def _pulse_seen(pulse: PulseSeen, by: float, limits: DoorLimits) -> PulseSeen:
+def _shifted_pulse(pulse: P, by: float, limits: DoorLimits, since: str) -> P:
+    """Shift the times of a pulse. `since`: the field with the start of the pulses that were good."""
     return replace(
         pulse,
         at=pulse.at + by,
         off_at=_at(pulse.off_at, by),
         failed_at=_at(pulse.failed_at, by),
-        row_since=_at(pulse.row_since, by, limits.t.travel_s),
+        **{since: _at(getattr(pulse, since), by, limits.t.travel_s)},
     )
 
 
