@@ -116,3 +116,22 @@ def test_a_message_that_cannot_be_put_into_bytes_does_not_keep_the_node_from_joi
     wait_until(lambda: len(everything) == 2, "the node has joined again and repeats its alarm")
     assert (everything, node.lives) == ([d.Bool(True)] * 2, True)
     assert caplog.messages == []
+
+
+def test_what_another_node_retains_is_heard_once_although_the_node_joins_again(
+    join_any_wire: Join,
+) -> None:
+    node, heard = join_any_wire("node"), list[d.Bool]()
+    ears = node.subscribe(FIRE_ALARM_TRIGGER, heard.append)
+    panel = join_any_wire("panel").publisher(FIRE_ALARM_TRIGGER)
+    panel.publish(d.Bool(False))
+    wait_until(lambda: heard == [d.Bool(False)], "the end of an old alarm is heard")
+    join_again(node)
+    wait_until(lambda: not ears.matched(), "the node has left")
+    wait_until(lambda: ears.matched(), "the node has joined again")
+    panel.publish(d.Bool(True))
+    wait_until(lambda: d.Bool(True) in heard, "the new alarm is heard")
+    late = list[d.Bool]()
+    node.subscribe(FIRE_ALARM_TRIGGER, late.append)
+    wait_until(lambda: len(late) == 2, "the retained messages have come again")
+    assert heard == late == [d.Bool(False), d.Bool(True)]

@@ -23,7 +23,8 @@ FLEET-ALARM-4. Another node's alarm stands from its `true` on. It also stands if
    A `false` of any node also ends all standing alarms, except the alarms of our nodes that still make
    statements. The reason is that RMF has obeyed the `false`, so the robots already drive. In the quiet
    start (the first seconds, in which the daemon only listens) such a `false` may be an old, retained
-   one. It then ends only its sender's alarm.
+   one. It then ends only its sender's alarm. Later the transport drops a retained `false` that was
+   heard before.
 FLEET-ALARM-5. If another node publishes `false` during a raised alarm, `true` is published again, but
    no more often than each AGAIN_S. The contradiction is a fault.
 FLEET-ALARM-6. Latched causes, the published `true` and other nodes' alarms survive a restart. After a

@@ -26,6 +26,7 @@ from bridges.messages.topics import AnyTopic
 from bridges.transports import notices
 from bridges.transports.dds.idl import IdlSample, sample_type
 from bridges.transports.peers import Peers
+from bridges.transports.repeats import Repeats
 from bridges.transports.senders import Senders
 from bridges.transports.transport import Receive, TransportError
 
@@ -147,6 +148,7 @@ class DdsSubscription:
         self._senders = senders
         self._finds_node = self._node_of  # bound once, because each message needs it
         self._others_only = others_only
+        self._repeats = Repeats(topic)
         self._reader: DataReader = None
         self._received = received
         self._dropped = dropped
@@ -218,9 +220,13 @@ class DdsSubscription:
                 continue
             if not samples:
                 return taken > 0
-            if samples[0].sample_info.valid_data:
-                senders.key = samples[0].sample_info.publication_handle
-                notices.hand_on(self._dropped, self.topic, self._received, samples[0].message)
+            info = samples[0].sample_info
+            if not info.valid_data:  # a notice, such as of a publisher that has left
+                continue
+            message = samples[0].message
+            if not self._repeats.has(info.source_timestamp, message):
+                senders.key = info.publication_handle
+                notices.hand_on(self._dropped, self.topic, self._received, message)
         return True
 
     def log_misfits(self, peers: Peers) -> None:

@@ -8,7 +8,7 @@ and only deliver the message.
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Final, Protocol
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -28,6 +28,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.releases import Release
 from bridges.messages.topics import AnyTopic
 from bridges.transports import notices
+from bridges.transports.repeats import Repeats
 from bridges.transports.ros2.types import ros_type
 from bridges.transports.transport import Receive, TransportError
 
@@ -173,6 +174,7 @@ class Ros2Subscription:
         self._received = received
         self._ends = ends
         self._dropped = dropped
+        self._repeats = Repeats(topic)
         self._using = threading.Lock()
         self._end: RosSubscription | None = None
         self._node: Node | None = None
@@ -227,7 +229,8 @@ class Ros2Subscription:
         names = [(end.node_namespace, end.node_name) for end in found]
         return [f"{space.rstrip('/')}/{name}" for space, name in names if (space, name) != ours]
 
-    def _take(self, sample: bytes) -> None:
+    def _take(self, sample: bytes, info: Mapping[str, int]) -> None:
+        """Deliver a sample. `info`: rclpy's MessageInfo, which a callback with two parameters gets."""
         try:
             message = cdr.decode(self.topic.type, sample, self._ends.release)
         except cdr.CdrError as error:
@@ -236,7 +239,8 @@ class Ros2Subscription:
         if message in self.said:
             self.said.remove(message)
             return
-        notices.hand_on(self._dropped, self.topic, self._received, message)
+        if not self._repeats.has(info["source_timestamp"], message):
+            notices.hand_on(self._dropped, self.topic, self._received, message)
         time.sleep(YIELD_S)
 
 

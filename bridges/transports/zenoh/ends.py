@@ -31,6 +31,7 @@ from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST
 from bridges.messages.topics import AnyTopic
 from bridges.transports import notices
+from bridges.transports.repeats import Repeats
 from bridges.transports.senders import Senders
 from bridges.transports.transport import Receive, TransportError
 from bridges.transports.zenoh import keys as zenoh_keys
@@ -225,6 +226,7 @@ class ZenohSubscription(ZenohEnd):
         self._received = received
         self._dropped = dropped
         self._attached = attached
+        self._repeats = Repeats(topic)
         self._waiting: deque[Sample | CdrError] = deque(maxlen=topic.subscribe.depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
@@ -289,7 +291,7 @@ class ZenohSubscription(ZenohEnd):
 
     def _message(self, sample: Sample | CdrError) -> Message | None:
         """Return the message of a sample. Return None if the subscription must not hear the sample's
-        publisher. Raises CdrError."""
+        publisher, or has heard the same sample before. Raises CdrError."""
         if isinstance(sample, CdrError):
             raise sample
         place = self.place
@@ -297,11 +299,13 @@ class ZenohSubscription(ZenohEnd):
             return None
         if sample.kind != SampleKind.PUT or str(sample.key_expr) != place.key:
             raise CdrError(f"no message: sent to {sample.key_expr}, or a deletion of a key")
-        attached = sample.attachment
-        sender = None if attached is None else zenoh_keys.sender(bytes(attached))
+        attached = None if sample.attachment is None else bytes(sample.attachment)
+        sender = None if attached is None else zenoh_keys.sender(attached)
         if sender is None and self._attached:
             raise CdrError("without the attachment of a ROS node")
         if sender in place.unheard:
             return None
         self._senders.key = sender
-        return cdr.decode(self.topic.type, bytes(sample.payload), self._release)
+        message = cdr.decode(self.topic.type, bytes(sample.payload), self._release)
+        sent_at = sample.timestamp and str(sample.timestamp)
+        return None if self._repeats.has(attached or sent_at, message) else message
