@@ -26,6 +26,8 @@ OPENS_S, MOVES_S = 5.0, 15.0
 """Normal times (s) of a door that nobody holds. OPENS_S is the time for which the door stays OPEN.
 MOVES_S is the time for which the door moves."""
 AWAY: Final = ("offline", "unknown")
+FIRE: Final = "FIRE_ALARM"
+"""The fault of a door in a fire alarm. A door that the daemon has then released is shown as unknown."""
 DOOR: Final = "door"
 """The kind of the door's own daemon, whose reason to wait means that it wants the door open."""
 
@@ -67,7 +69,9 @@ def answer(
         or first_causes.own_fault(found, door, clock, around, door.mode.value, end)
     ):
         return found
-    if door.mode.value in AWAY:
+    if FIRE in door.faults(clock.now) and (door.mode.value in AWAY or not held_open):
+        _in_a_fire(found, door, clock)
+    elif door.mode.value in AWAY:
         _away(found, door, clock)
     elif claim is None:
         _nobody_asks(found, door, clock, around)
@@ -121,6 +125,15 @@ def _forgotten(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
             f" {clock.time(since.wall)}. The supervisor has most likely restarted and forgotten {who},"
             " which may stand in the doorway."
         )
+
+
+def _in_a_fire(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
+    detail, _ = door.faults(clock.now)[FIRE]
+    found.say(
+        f"There is a fire alarm, and {detail}.",
+        "a person",
+        "wait until the alarm is over; if nothing burns, check the fire contact and its wire",
+    )
 
 
 # ---- a requester waits

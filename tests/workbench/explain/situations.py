@@ -276,6 +276,24 @@ def door_does_not_open() -> Case:
     return scene.heard, "door", "ward"
 
 
+def door_in_a_fire() -> Case:
+    """A robot waits for a fire door, which the daemon releases in a fire."""
+    scene = Scene("lab")
+    scene.press("lab", "fire", True)
+    scene.run(2.0)
+    scene.robot("fleet/red").opens("lab")
+    scene.run(30.0)
+    return scene.heard, "door", "lab"
+
+
+def door_held_open_in_a_fire() -> Case:
+    """Nobody waits for a door that the daemon holds open in a fire."""
+    scene = Scene("ward")
+    scene.press("ward", "fire", True)
+    scene.run(30.0)
+    return scene.heard, "door", "ward"
+
+
 def door_without_supervisor() -> Case:
     """No supervisor runs, so nobody takes the requests of the fleet adapters."""
     scene = Scene("ward")
@@ -402,6 +420,8 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         door_held_by_a_dead_robot,
         door_supervisor_forgets_a_robot,
         door_does_not_open,
+        door_in_a_fire,
+        door_held_open_in_a_fire,
         door_without_supervisor,
         door_held_open_by_a_person,
         door_asked_once_stays_shut,
