@@ -258,7 +258,7 @@ def relays(device: Device, clock: TimePhrases) -> str:
 
     An example is `; its daemon has these relays on: agv_request, call L3`.
     """
-    told = device.told("outputs", clock.now)
+    told = device.told("outputs", clock.now).replace("between_pulses", "hold_open in pulses")
     shown = [part.removesuffix(" yes") for part in told.split(", ") if not part.endswith(" 0")]
     if not told:
         return ""

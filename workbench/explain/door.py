@@ -70,7 +70,7 @@ def answer(
     ):
         return found
     if FIRE in door.faults(clock.now) and (door.mode.value in AWAY or not held_open):
-        _in_a_fire(found, door, clock)
+        first_causes.own_fault(found, door, clock, around, codes=(FIRE,))
     elif door.mode.value in AWAY:
         _away(found, door, clock)
     elif claim is None:
@@ -127,15 +127,6 @@ def _forgotten(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
         )
 
 
-def _in_a_fire(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    detail, _ = door.faults(clock.now)[FIRE]
-    found.say(
-        f"There is a fire alarm, and {detail}.",
-        "a person",
-        "wait until the alarm is over; if nothing burns, check the fire contact and its wire",
-    )
-
-
 # ---- a requester waits
 
 
@@ -179,7 +170,11 @@ def _stays_shut(found: Answer, door: DoorFacts, clock: TimePhrases, asked: str) 
 
 
 def _opens_fully(door: DoorFacts) -> NextStep:
-    return NextStep("the controller", f"open {door.name} fully, so that its contact shows OPEN")
+    return NextStep(
+        "the controller",
+        f"open {door.name} fully, so that its contact shows OPEN; if it does not, a person has to check"
+        " the relay that drives the leaf, and its wire",
+    )
 
 
 def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:

@@ -4,7 +4,7 @@ There are three such causes: two nodes that publish under one name, readings tha
 fault of the device itself. As long as such a cause lasts, the explanation blames nothing else.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Final
 
 from bridges.observe.limits import FLAPS, FLAPS_WITHIN_S
@@ -41,12 +41,6 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
         " Meanwhile the daemon asks the controller for nothing, so the controller is not to blame.",
         FLICKERS,
     ),
-    "DOOR_OPENING_FAULT": CONTACT,
-    "DOOR_TRAVEL_TIMEOUT": CONTACT,
-    "RUNTIME_LIMIT_EXCEEDED": (
-        "The car does not come, or the floor code does not show that the car has come.",
-        "",
-    ),
     **dict.fromkeys(
         (
             "DOOR_CONTACTS_CONTRADICT",
@@ -57,16 +51,27 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
             "FLOOR_CODE_ILLEGAL",
             "POSITION_LOST",
             "MOTION_CONTRADICTORY",
-            "START_TIMEOUT",
         ),
         ("", ""),
     ),
+    "DOOR_OPENING_FAULT": CONTACT,
+    "DOOR_TRAVEL_TIMEOUT": CONTACT,
+    "RUNTIME_LIMIT_EXCEEDED": (
+        "The car does not come, or the floor code does not show that the car has come.",
+        "",
+    ),
+    "START_TIMEOUT": ("", ""),
 }
 """Faults of the device itself. The fault that explains most comes first.
 
 Each code has two texts: an explanation, and what a person should check. "" stands for the text in
 `bridges/runtime/faults.yaml`.
 """
+IF_SO: Final[Mapping[str, tuple[str, str]]] = {
+    "AGV_MODE_LOST": ("Until its next try the daemon asks the controller for nothing.", ""),
+    **dict.fromkeys(("FIRE_ALARM", "MANUAL", "OUT_OF_SERVICE", "OVERLOAD"), ("", "")),
+}
+"""Faults that explain a device only in some states, with texts as in `OWN`."""
 READINGS: Final = ("INPUTS_NOT_FRESH", "COMMUNICATION_LOST")
 OFFLINE: Final = (*READINGS, "OUTPUTS_NOT_WRITTEN", "MANUAL", "OUT_OF_SERVICE")
 """Faults because of which a daemon publishes its device as OFFLINE."""
@@ -141,9 +146,10 @@ def own_fault(
     around: OthersHeard,
     shown: str = "",
     end: str = "open",
+    codes: Collection[str] = OWN.keys(),
 ) -> bool:
-    """Explain the fault of the device itself that explains most. Return whether the device has such a
-    fault.
+    """Explain the fault of the device itself that explains most. Return whether the device has one of
+    the faults `codes`.
 
     `shown` is the door's published state. `end` is the state that the door should have. If the door is
     shown closed, the leaf has not moved. Therefore the text does not blame the end contact.
@@ -153,11 +159,11 @@ def own_fault(
         present.setdefault(around.reason.fault, around.reason.text.partition(": ")[2])
     if shown == "closed":
         present.pop("DOOR_OPENING_FAULT", None)
-    code = next((code for code in OWN if code in present), None)
+    code = next((code for code in codes if code in present), None)
     if code is None:
         return False
     cause, do = around.remedies.get(code, (f"its daemon reports {code}", f"mend {code}"))
-    why, look = OWN[code]
+    why, look = {**OWN, **IF_SO}.get(code, ("", ""))
     names = {"end": end, "contact": {"open": "'opened'", "shut": "'closed'"}[end]}
     detail = f": {present[code].rstrip('.?')}" if present[code] else ""
     found.because = ()

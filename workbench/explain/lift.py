@@ -28,6 +28,11 @@ Only a fleet adapter that knows the recall floor sends this request.
 FLOOR_S: Final = 20.0
 """Maximum normal time (s) that a car needs from one floor to the next."""
 LATCHED: Final = "FIRE_LATCHED"
+AWAY: Final = ("MANUAL", "OUT_OF_SERVICE")
+"""Faults of a lift in OFFLINE mode that can be read."""
+UNTIL: Final = "for the end of "
+"""The beginning of the daemon's reason to wait if faults keep it from serving a session. Their codes
+follow."""
 ALARMS: Final = {"FIRE": "fire alarm", "EMERGENCY": "emergency (stop, code blue, earthquake)"}
 
 
@@ -88,7 +93,8 @@ def _why(
             f" cannot be read, and takes no robot.{f' {lift.keeps(clock.now)}' if kept else ''}"
         )
         _lets_in(found, lift, clock)
-        found.acts("a person", "find out why it is out of service, or cannot be read")
+        if not first_causes.own_fault(found, lift, clock, around, codes=AWAY):
+            found.acts("a person", "find out why it is out of service, or cannot be read")
     elif silent is not None and (silent.ended or silent.wants in (lift.floors or silent.wants)):
         not_passed_on(found, lift, silent, clock, around)
     elif lift.session.value != NOBODY:
@@ -271,14 +277,24 @@ def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.Oth
             found.say(
                 f"{holder} itself has waited {clock.since(theirs.since)} for the lift at {where}."
             )
-        _missing(found, lift, theirs, clock)
+        _missing(found, lift, theirs, clock, around)
     lift_holder.forgotten(found, lift, holder, clock)
 
 
-def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
+def _missing(
+    found: Answer,
+    lift: LiftFacts,
+    claim: DeviceRequester,
+    clock: TimePhrases,
+    around: common.OthersHeard,
+) -> None:
     """Explain which condition is not yet met for the robot that has the session. The conditions are
-    mode, floor and door."""
+    mode, floor and door. But if the lift's daemon waits for the end of a fault, that fault is the
+    cause."""
     on = common.relays(lift, clock)
+    _, _, ends = lift.waits_said(clock.now).get("lift", "").partition(UNTIL)
+    if first_causes.own_fault(found, lift, clock, around, codes=ends.split(", ")):
+        return
     if lift.floor.value == NO_FLOOR and lift.door.value == "open":
         found.say(
             f"The door has been open {clock.since(lift.door.since)}, but the car is at no known floor,"
@@ -291,9 +307,8 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
     elif lift.floor.value == NO_FLOOR and lift.motion.value == "stopped":
         found.say(
             f"The car has stood at no known floor {clock.since(lift.floor.since)}{on}.",
-            "the controller",
-            "show the car's floor: check the floor code's wires, and whether the car stands between"
-            " floors",
+            "a person",
+            "check whether the car stands between floors; if it does not, check the floor code's wires",
         )
     elif lift.floor.value != claim.wants and _rides(lift, claim, clock):
         found.say(
@@ -307,7 +322,8 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
             f"The car has not come to {claim.wants}: it has been at {lift.floor.value}"
             f" {clock.since(lift.floor.since)}{on}.",
             "the controller",
-            f"bring the car to {claim.wants}",
+            f"bring the car to {claim.wants}; if it does not, a person has to check the call's relay"
+            " and its wire",
         )
     elif on and "hold_door" not in on and lift.motion.value != "stopped":
         found.say(

@@ -242,6 +242,33 @@ def all_is_well() -> Case:
     return scene.heard, "lift", "Lift1"
 
 
+def driven_by_hand() -> Case:
+    """A technician drives the lift for which a robot waits."""
+    scene = Scene("Lift2")
+    scene.press("Lift2", "manual_mode", True)
+    return _waits_for_lift2(scene)
+
+
+def overloaded() -> Case:
+    """The car is too heavy, or the contact that says so is wrong."""
+    scene = Scene("Lift2")
+    scene.fail("Lift2", "overload", "wrong")
+    return _waits_for_lift2(scene)
+
+
+def agv_mode_is_lost() -> Case:
+    """The contact that confirms AGV mode fails. The daemon asks for nothing until its next try."""
+    scene = Scene("Lift2")
+    scene.fail("Lift2", "agv_mode", "wrong")
+    return _waits_for_lift2(scene)
+
+
+def _waits_for_lift2(scene: Scene) -> Case:
+    scene.robot("fleet/red").asks("Lift2", "L3")
+    scene.run(30.0)
+    return scene.heard, "lift", "Lift2"
+
+
 def door_held_by_a_dead_robot() -> Case:
     """A robot's adapter has died while the robot held the door open."""
     scene = Scene("ward")
@@ -292,6 +319,15 @@ def door_held_open_in_a_fire() -> Case:
     scene.press("ward", "fire", True)
     scene.run(30.0)
     return scene.heard, "door", "ward"
+
+
+def door_whose_position_is_unknown() -> Case:
+    """A door's controller shows a number that its map does not list, and the door does not open."""
+    scene = Scene("icu")
+    scene.fail("icu", "closed", "wrong")
+    scene.robot("fleet/red").opens("icu")
+    scene.run(30.0)
+    return scene.heard, "door", "icu"
 
 
 def door_without_supervisor() -> Case:
@@ -417,10 +453,14 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         stamps_of_another_clock,
         two_nodes,
         all_is_well,
+        driven_by_hand,
+        overloaded,
+        agv_mode_is_lost,
         door_held_by_a_dead_robot,
         door_supervisor_forgets_a_robot,
         door_does_not_open,
         door_in_a_fire,
+        door_whose_position_is_unknown,
         door_held_open_in_a_fire,
         door_without_supervisor,
         door_held_open_by_a_person,
