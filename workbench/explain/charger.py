@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from bridges.kinds.charger.pad import misplaced_in
-from bridges.kinds.charger.report import STATION_NEXT, FaultCause, diagnosis
+from bridges.kinds.charger.report import LOST, STATION_NEXT, UNREQUESTED, FaultCause, diagnosis
 from bridges.kinds.charger_coordinator import reasons
 from bridges.observe.charger import NOBODY
 from bridges.observe.diagnosis import Diagnosis
@@ -29,6 +29,8 @@ LONG_S: Final = 120.0
 """Time (s) that a robot normally needs to come to its charger. After this time, a person should look
 for the cause."""
 REFUSED_LATELY_S: Final = 60.0
+SAYS_MORE: Final = (*LOST, "UNKNOWN_VENDOR_STATE")
+"""Faults of a charger in error whose detail says more than the error's text."""
 
 
 def answer(
@@ -58,7 +60,7 @@ def answer(
         first_causes.two_nodes(found, charger, clock, around, "charger_states")
         or first_causes.own_fault(found, charger, clock, around)
     ):
-        _next(found, charger, clock)
+        _next(found, charger, clock, around)
     _refusal(found, charger, clock)
     if coordinator is not None:
         _coordinated(found, charger, coordinator, around)
@@ -69,14 +71,16 @@ def _state(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
     who, request = charger.robot.value, charger.request.value
     assigned = charger.condition.value == "assigned"
     whose = "" if who == NOBODY else f" {'to' if assigned else 'for'} {who}"
-    asked = f" (request {request})" if request else ""
+    asked = f" (request {request})" if request and not request.startswith(UNREQUESTED) else ""
     state = {"error": "in error"}.get(charger.condition.value, charger.condition.value)
     found.say(
         f"{charger.name} has been {state}{whose}{asked} {clock.since(charger.condition.since)}."
     )
 
 
-def _next(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
+def _next(
+    found: Answer, charger: ChargerFacts, clock: TimePhrases, around: common.OthersHeard
+) -> None:
     who = charger.robot.value
     match charger.condition.value:
         case "idle":
@@ -109,7 +113,8 @@ def _next(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
                 f"{who if who != NOBODY else 'the robot'} has to leave the pad",
             )
         case "error":
-            _error(found, charger)
+            if not first_causes.own_fault(found, charger, clock, around, codes=SAYS_MORE):
+                _error(found, charger)
         case other:
             found.say(
                 f"RMF defines no charger state {other}.",

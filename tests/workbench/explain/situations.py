@@ -398,6 +398,22 @@ def charger_refuses() -> Case:
     return scene.heard, "charger", "bay1"
 
 
+def charger_shows_an_unknown_number() -> Case:
+    """A station shows a number that the file does not list."""
+    scene = Scene("bay1")
+    scene.fail("bay1", "body", "wrong")
+    scene.run(10.0)
+    return scene.heard, "charger", "bay1"
+
+
+def charger_answers_badly() -> Case:
+    """A station answers, but with a text in place of a number."""
+    scene = Scene("bay1")
+    scene.fail("bay1", "server", "wrong")
+    scene.run(10.0)
+    return scene.heard, "charger", "bay1"
+
+
 def wrong_station() -> Case:
     """A robot stands at a charger that is promised to another robot."""
     scene = Scene(diagnoses=False)
@@ -469,6 +485,8 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         door_let_go_is_kept_open,
         coordinator_gave_up_on_a_robot,
         charger_refuses,
+        charger_shows_an_unknown_number,
+        charger_answers_badly,
         wrong_station,
         coordinator_queues,
         charger_is_listed_but_silent,
