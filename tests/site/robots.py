@@ -16,6 +16,7 @@ from bridges.messages import topics
 from bridges.messages.stamps import duration
 from bridges.transports.transport import Transport
 from tests.site.charging import Charge
+from tests.site.network import Heeded
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
 from workbench.rmf_model.robot import Phase, RobotContext
@@ -96,7 +97,7 @@ class Resident:
     `join(name)` gives the robot's adapter a place on the graph. `pace` is the length of the robot's
     pauses relative to a real robot. `disturbed_at` is the time at which the adapter last died. After
     that time a request in the robot's name may come from a supervisor, and not from the robot. `heeds`
-    gets the names of the topics whose states can change anything for the robot.
+    gets the topics and devices whose states can change anything for the robot.
     """
 
     def __init__(
@@ -124,7 +125,7 @@ class Resident:
         self.doorway = ""
         self.pad = ""
         self.robot: RobotContext
-        self.heeds: Callable[[frozenset[str]], None] = lambda topics: None
+        self.heeds: Callable[[frozenset[Heeded]], None] = lambda heeded: None
         self._timeline = timeline
         self._join = join
         self._ground = ground
@@ -248,14 +249,18 @@ class Resident:
         self._alarm.set(min(self._until, wake_at))
         self.heeds(frozenset(self._heeded()))
 
-    def _heeded(self) -> Iterator[str]:
-        """Yield the topics whose states can change anything for the robot."""
-        if isinstance(self.robot.phase, DoorOpen):
-            yield topics.DOOR_STATES.name
-        if self.robot.destination is not None or isinstance(self.robot.phase, EndLiftSession):
-            yield topics.LIFT_STATES.name
+    def _heeded(self) -> Iterator[Heeded]:
+        """Yield the topics and devices whose states can change anything for the robot. Jazzy's adapter
+        repeats its request at each state of every lift."""
+        robot, phase = self.robot, self.robot.phase
+        if isinstance(phase, DoorOpen):
+            yield topics.DOOR_STATES.name, phase.door
+        if robot.destination is not None:
+            yield topics.LIFT_STATES.name, "" if self._jazzy else robot.destination.lift
+        if isinstance(phase, EndLiftSession):
+            yield topics.LIFT_STATES.name, phase.lift
         if self.waits_for == CHARGER:
-            yield topics.CHARGER_STATES.name
+            yield topics.CHARGER_STATES.name, ""
 
     def _say(self, said: Any) -> None:
         for topic, message in said:

@@ -7,14 +7,15 @@ from typing import Any
 import pytest
 
 from bridges.kinds.lift import forgotten
-from bridges.messages.topics import DOOR_REQUESTS, LIFT_STATES, Topic
+from bridges.messages import definitions as d
+from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES, LIFT_STATES, Topic
 from tests.depth import depth
 from tests.site.building import hospital
 from tests.site.daemons import DeviceDaemon, rmfs_door_supervisor
 from tests.site.day import Site
 from tests.site.growth import Look, growth
 from tests.site.laws import Broken, Laws
-from tests.site.network import Air
+from tests.site.network import CLEAR, Air, Place
 from tests.site.saved import OtherCode, load, save
 from tests.site.timeline import Timeline
 
@@ -64,6 +65,32 @@ def test_what_rmfs_supervisors_say_once_is_late_but_never_lost() -> None:
     assert min(len(copies) for copies in sent) == 1
     assert max(max(copies) for copies in sent) >= air.weather.latest_s
     assert () in [air.delays("door_supervisor", "door", DOOR_REQUESTS) for _ in range(2000)]
+
+
+def test_a_robot_in_a_hospital_hears_its_door_and_then_the_next_other_one() -> None:
+    """RMF's DoorOpen looks at the latest state of any door."""
+    timeline = Timeline()
+    air = Air(timeline, Random(1))
+    air.sorts, air.weather = True, CLEAR
+    heard = list[str]()
+    robot = Place(air, "fleet/red", lambda: None, choosy=True)
+    robot.subscribe(DOOR_STATES, lambda state: heard.append(state.door_name))
+    doors = Place(air, "doors", lambda: None).publisher(DOOR_STATES)
+
+    def told(*names: str) -> list[str]:
+        heard.clear()
+        for name in names:
+            doors.publish(d.DoorState(door_name=name))
+            timeline.run(timeline.now + 1.0)
+        return list(heard)
+
+    assert told("ward", "lab") == []
+    robot.heed(frozenset({(DOOR_STATES.name, "ward")}))
+    assert told("lab", "ward", "lab", "store", "ward") == ["ward", "lab", "ward"]
+    robot.heed(frozenset({(DOOR_STATES.name, "")}))
+    assert told("lab", "ward", "lab") == ["lab", "ward", "lab"]
+    robot.close()
+    assert told("ward", "lab") == []
 
 
 @pytest.mark.long(3)
