@@ -15,10 +15,14 @@ from workbench.explain.answer import Answer
 from workbench.explain.phrases import TimePhrases
 from workbench.explain.workcell_facts import WorkcellFacts
 
-DECIDE: Final = (
-    "look at robot and machine, then run `rmf-bridge workcell done FILE`; write `again` or `failed`"
-    " in place of `done` if that is true"
+STOPS: Final = (
+    "MEMORY_LOST",
+    "OUTCOME_UNKNOWN",
+    "NOT_KEPT",
+    "WORKCELL_HALTED",
+    "WORKCELL_FAULT",
 )
+"""Faults because of which a workcell that can be read is OFFLINE, the most serious first."""
 ENDS: Final = {
     "success": "It has succeeded: RMF goes on after the workcell's next state or result.",
     "failed": "It has failed: RMF ends the task.",
@@ -42,7 +46,7 @@ def answer(workcell: WorkcellFacts, clock: TimePhrases, around: common.OthersHea
         first_causes.two_nodes(found, workcell, clock, around, states)
         or first_causes.own_fault(found, workcell, clock, around)
     ):
-        _next(found, workcell, clock)
+        _next(found, workcell, clock, around)
     return found
 
 
@@ -54,7 +58,9 @@ def _doubt(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
             found.say(f"Request {wait.who} has had no answer, and RMF repeats it without end.")
 
 
-def _next(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
+def _next(
+    found: Answer, workcell: WorkcellFacts, clock: TimePhrases, around: common.OthersHeard
+) -> None:
     asks = [one for one in workcell.requesters if one.asks(clock.now)]
     if not asks:
         queue = workcell.queue.value
@@ -70,7 +76,9 @@ def _next(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
         )
         found.say(ended, "the fleet adapter", "go on")
     elif workcell.mode.value == "offline":
-        found.say(said, "a person", DECIDE)
+        found.say(said)
+        if not first_causes.own_fault(found, workcell, clock, around, codes=STOPS):
+            found.acts("a person", "find out why the workcell is offline")
     elif workcell.mode.value == "busy":
         found.say(said, "the controller", "finish its cycle")
     elif workcell.lists(first.who):

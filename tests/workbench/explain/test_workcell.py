@@ -9,6 +9,8 @@ from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.observe.all_devices import PlainGraph
+from bridges.runtime.diagnostics import diagnosis
+from bridges.runtime.faults import for_explain
 from workbench.explain.heard_devices import HeardDevices
 
 WALL = 1_800_000_000.0
@@ -59,6 +61,26 @@ def test_it_says_which_request_waits_and_who_must_act(lines: Any, says: str, who
     found = told(*lines)
     assert says in " ".join(found.now)
     assert [step.who for step in found.next][:1] == [who]
+
+
+@pytest.mark.parametrize(
+    ("code", "do"),
+    [
+        ("OUTCOME_UNKNOWN", "look at the robot and the machine"),
+        ("WORKCELL_FAULT", "mend the workcell"),
+        ("WORKCELL_HALTED", "clear the workcell"),
+        ("NOT_KEPT", "make room on the disk"),
+    ],
+)
+def test_a_workcell_that_can_be_read_is_offline_for_its_fault(code: str, do: str) -> None:
+    said = {"faults": [{"code": code, "detail": ""}]}
+    site = HeardDevices()
+    for at, topic, message in sorted([*states(9, 2, "task"), *asks(9)], key=_at):
+        site.take(Heard(at, WALL + at, f"dispenser_{topic}", message))
+        told = diagnosis("node", "dispenser", {}, {"store": said}, stamp(WALL + at))
+        site.take(Heard(at, WALL + at, "diagnostics", told))
+    explained = site.explain("dispenser", "store", None, for_explain())
+    assert [(step.who, step.what.startswith(do)) for step in explained.next] == [("a person", True)]
 
 
 @pytest.mark.parametrize(("status", "waits"), [(0, [4.5]), (1, []), (2, [])])
