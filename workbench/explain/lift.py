@@ -16,7 +16,7 @@ from workbench.explain.answer import Answer
 from workbench.explain.explanation import CheckedField
 from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.lift_ungranted import SETTLES_S, not_granted, not_passed_on
-from workbench.explain.phrases import TimePhrases
+from workbench.explain.phrases import TimePhrases, listed
 from workbench.explain.rows import label
 
 STANDS_S: Final = 5.0
@@ -33,6 +33,8 @@ AWAY: Final = ("MANUAL", "OUT_OF_SERVICE")
 UNTIL: Final = "for the end of "
 """The beginning of the daemon's reason to wait if faults keep it from serving a session. Their codes
 follow."""
+EMERGENCIES: Final = {"CODE_BLUE": "code blue", "EARTHQUAKE": "earthquake alarm"}
+"""Faults of a lift in EMERGENCY mode that have a contact of their own."""
 ALARMS: Final = {"FIRE": "fire alarm", "EMERGENCY": "emergency (stop, code blue, earthquake)"}
 
 
@@ -193,7 +195,7 @@ def _others_wait(
 
 def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
     mode, holder, floor = lift.mode.value, lift.session.value, lift.floor.value
-    found.because = (mode,)
+    found.because = (mode, *EMERGENCIES)
     found.say(
         f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: the lift takes no robot"
         " until this mode ends. RMF ignores the mode, and only sees that the lift does not come."
@@ -204,16 +206,19 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
             found.say(lift.keeps(clock.now))
         found.acts("a person", "when the lift is safe, reset it: the daemon sees no fire now")
         return
-    ends = f"the {ALARMS[mode]} has to end, with a reset if the lift's settings require one"
+    ends = f"{_hazard(lift, clock)} has to end, with a reset if the lift's settings require one"
     if holder == NOBODY:
         found.acts("the controller", ends)
         return
     found.say(lift.keeps(clock.now))
     if _lets_in(found, lift, clock):
         return
+    if mode != "FIRE":
+        found.acts("the controller", ends)
+        return
     theirs = lift.requesters.get(holder)
     stands = lift.door.value == "open" and clock.now.at - lift.door.since.at > STANDS_S
-    if mode != "FIRE" or not stands or theirs is None or not theirs.asks(clock.now):
+    if not stands or theirs is None or not theirs.asks(clock.now):
         found.acts(
             "the controller",
             f"bring the car to the recall floor and open its door there; then {ends}",
@@ -229,6 +234,13 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
             f"leave the lift alone until the alarm is over; then name {floor} as the recall floor in"
             " the fleet's YAML (`lift_emergency_levels`)",
         )
+
+
+def _hazard(lift: LiftFacts, clock: TimePhrases) -> str:
+    """Name the hazard of a lift in FIRE or EMERGENCY mode."""
+    mode = lift.mode.value
+    known = [EMERGENCIES[code] for code in lift.faults(clock.now) if code in EMERGENCIES]
+    return f"the {listed(known) if known and mode == 'EMERGENCY' else ALARMS[mode]}"
 
 
 def _lets_in(found: Answer, lift: LiftFacts, clock: TimePhrases) -> bool:

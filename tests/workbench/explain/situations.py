@@ -249,6 +249,13 @@ def driven_by_hand() -> Case:
     return _waits_for_lift2(scene)
 
 
+def earthquake() -> Case:
+    """The lift stands after an earthquake, or its contact is wrong."""
+    scene = Scene("Lift2")
+    scene.press("Lift2", "earthquake", True)
+    return _waits_for_lift2(scene)
+
+
 def overloaded() -> Case:
     """The car is too heavy, or the contact that says so is wrong."""
     scene = Scene("Lift2")
@@ -470,6 +477,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         two_nodes,
         all_is_well,
         driven_by_hand,
+        earthquake,
         overloaded,
         agv_mode_is_lost,
         door_held_by_a_dead_robot,
