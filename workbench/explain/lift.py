@@ -213,22 +213,22 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
     found.say(lift.keeps(clock.now))
     if _lets_in(found, lift, clock):
         return
-    if mode != "FIRE":
-        found.acts("the controller", ends)
-        return
     theirs = lift.requesters.get(holder)
     stands = lift.door.value == "open" and clock.now.at - lift.door.since.at > STANDS_S
-    if not stands or theirs is None or not theirs.asks(clock.now):
+    wants = theirs.wants if stands and theirs and theirs.asks(clock.now) else ""
+    if wants == floor:
+        found.say(f"The door is open at {floor}.", "the robot", f"{holder} has to drive out")
+    elif mode != "FIRE":
+        found.acts("the controller", ends)
+    elif not wants:
         found.acts(
             "the controller",
             f"bring the car to the recall floor and open its door there; then {ends}",
         )
-    elif theirs.wants == floor:
-        found.say(f"The door is open at {floor}.", "the robot", f"{holder} has to drive out")
     else:
         found.say(
             f"The car stands at {floor} with its door open, as after a recall, and {holder} still asks"
-            f" for {theirs.wants}: its fleet adapter does not know the recall floor, or has not heard"
+            f" for {wants}: its fleet adapter does not know the recall floor, or has not heard"
             " the alarm.",
             "a person",
             f"leave the lift alone until the alarm is over; then name {floor} as the recall floor in"

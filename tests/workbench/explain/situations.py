@@ -256,6 +256,20 @@ def earthquake() -> Case:
     return _waits_for_lift2(scene)
 
 
+def earthquake_with_a_robot_inside() -> Case:
+    """After an earthquake the car stands at the robot's floor with its door open."""
+    scene = Scene("Lift2")
+    red = scene.robot("fleet/red")
+    red.asks("Lift2", "L2")
+    scene.until(red)
+    scene.run(4.0)
+    red.asks("Lift2", "L3", inside=True)
+    scene.run(5.0)
+    scene.press("Lift2", "earthquake", True)
+    scene.run(30.0)
+    return scene.heard, "lift", "Lift2"
+
+
 def overloaded() -> Case:
     """The car is too heavy, or the contact that says so is wrong."""
     scene = Scene("Lift2")
@@ -478,6 +492,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
         all_is_well,
         driven_by_hand,
         earthquake,
+        earthquake_with_a_robot_inside,
         overloaded,
         agv_mode_is_lost,
         door_held_by_a_dead_robot,
