@@ -9,7 +9,7 @@ supervisor must list the robot for this door. RMF's DoorClose waits until no hea
 from shlex import quote
 from typing import Final
 
-from bridges.observe.door import CLOSED, OPEN
+from bridges.observe.door import CLOSED, OPEN, SUPERVISOR
 from bridges.observe.limits import FLAPS, REQUESTER_SILENT_S
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain import answer as common
@@ -17,19 +17,19 @@ from workbench.explain import first_causes
 from workbench.explain.answer import Answer
 from workbench.explain.door_facts import DoorFacts
 from workbench.explain.explanation import CheckedField, NextStep
-from workbench.explain.phrases import TimePhrases
+from workbench.explain.phrases import TimePhrases, listed
 
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
 """Maximum normal time (s) of a robot's drive through a doorway."""
-OPENS_S, MOVES_S = 5.0, 15.0
-"""Normal times (s) of a door that nobody holds. OPENS_S is the time for which the door stays OPEN.
-MOVES_S is the time for which the door moves."""
+OPENS_S, MOVES_S = 8.0, 15.0
+"""Normal times (s) of a door that nobody holds. OPENS_S is the time from the last holder's end until
+the door moves. MOVES_S is the time for which the door moves."""
 AWAY: Final = ("offline", "unknown")
 FIRE: Final = "FIRE_ALARM"
 """The fault of a door in a fire alarm. A door that the daemon has then released is shown as unknown."""
-DOOR: Final = "door"
-"""The kind of the door's own daemon, whose reason to wait means that it wants the door open."""
+HARMLESS: Final = ("nothing:", "nothing to", "intended")
+"""The beginnings of the remedies of faults that need nobody."""
 
 
 def answer(
@@ -61,8 +61,7 @@ def answer(
     if len(door.flaps(clock.now)) < FLAPS and (old := common.old_reading(door, clock)):
         found.say(old)
     held_open = door.holders or claim or (door.asked and door.asked.value == OPEN)
-    waits = DOOR in door.waits_said(clock.now)
-    end = "open" if held_open or waits else "shut"
+    end = "open" if held_open or door.has_order(clock.now) else "shut"
     if (
         first_causes.two_nodes(found, door, clock, around, "door_states")
         or first_causes.comes_and_goes(found, door, clock)
@@ -218,7 +217,8 @@ def _nobody_asks(
     found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard
 ) -> None:
     asked = door.asked.value if door.asked else ""
-    for_s = clock.now.at - door.mode.since.at
+    free = max(door.mode.since.at, door.released.at if door.released else 0.0)
+    for_s = clock.now.at - free
     if door.forgotten and not door.holders:
         who = next(iter(door.forgotten))
         found.acts(
@@ -230,10 +230,10 @@ def _nobody_asks(
         _held_open(found, door, clock)
     elif door.last_heartbeat is None and asked == OPEN:
         _asked_open(found, door, clock)
-    elif door.holders or DOOR in door.waits_said(clock.now):
+    elif door.holders or door.has_order(clock.now):
         _stays_shut(found, door, clock, "OPEN is wanted")
     elif door.mode.value == CLOSED:
-        found.say("Nobody waits for the door.", "nobody", "there is nothing to do")
+        _idle(found, door, clock, around)
     elif door.last_heartbeat is None and not asked and not door.asks_now(clock.now):
         _nobody_tells(found, door, clock, around)
     elif not door.mode.since.seen and for_s <= MOVES_S:
@@ -256,6 +256,29 @@ def _nobody_asks(
             "the controller",
             f"close {door.name} when nobody is in the doorway",
         )
+
+
+def _idle(found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
+    """Explain a closed door that nobody wants open. One of its faults may still need a person."""
+    faults = door.faults(clock.now)
+    for code in faults:
+        do = around.remedies.get(code, ("", ""))[1]
+        if do and not do.startswith(HARMLESS):
+            found.because = tuple(other for other in faults if other != code)
+            text = f"Nobody waits for the door, but its fault {code} needs a person."
+            found.say(text, "a person", do)
+            return
+    heard = door.asked or door.last_heartbeat or door.unanswered or door.noted
+    if heard is None and around.senders is None:
+        found.say(
+            "No request and no heartbeat was heard, only states. So nobody waits for the door, or these"
+            " topics are not recorded.",
+            "nobody",
+            "if a robot waits: record `/adapter_door_requests`, `/door_requests` and"
+            " `/door_supervisor_heartbeat` too",
+        )
+        return
+    found.say("Nobody waits for the door.", "nobody", "there is nothing to do")
 
 
 def _nobody_tells(
@@ -292,7 +315,8 @@ def _nobody_tells(
         )
         return
     found.say(
-        f"Nothing asks for CLOSE: either {holds}, or no door supervisor is running.",
+        f"Nothing asks for CLOSE: either {holds}, or no door supervisor is running, or"
+        " `door_requests` is not recorded.",
         "a person",
         f"{doorway}; when no robot stands in it, see whether the door supervisor is running",
     )
@@ -302,36 +326,55 @@ def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     """Explain a request that was heard only on `door_requests`, the topic of the door's daemon. The
     sender is the supervisor, or a person with `send --direct`."""
     assert door.asked is not None
-    found.say(
-        f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
-    )
-    opened = NextStep("the robot", "drive through; then its fleet adapter sends CLOSE")
-    found.next.append(opened if door.mode.value == OPEN else _opens_fully(door))
+    since, direct = door.asked.since, door.sender != SUPERVISOR
+    said = f"On door_requests {door.asked_by} has asked for OPEN {clock.since(since)}"
+    if door.mode.value != OPEN:
+        _stays_shut(found, door, clock, said)
+        return
+    sent = [door.sender] if direct else [one.who for one in door.requesters if one.wants == OPEN]
+    whose = "" if direct or not sent else f" {listed(sent[:4])} sent OPEN and no CLOSE."
+    _ends_hold(found, door, clock, sent[0] if sent else "", since, f"{said}.{whose}")
 
 
 def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Name the holders, and tell when the last request came. Silence is normal, because a robot in a
-    doorway sends nothing."""
+    """Name the holders, and tell when the last request came."""
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
     claim = door.requesters.get(who)
-    last: Moment | None = claim.last if claim else None
     said = (
-        f"The last request came at {clock.time(last.wall)}."
-        if last
+        f"The last request came at {clock.time(claim.last.wall)}."
+        if claim
         else "No request from a holder was heard."
     )
-    if clock.now.at - since.at <= LONG_S:
+    _ends_hold(found, door, clock, who, since, said)
+
+
+def _ends_hold(
+    found: Answer, door: DoorFacts, clock: TimePhrases, who: str, since: Moment, said: str
+) -> None:
+    """Say how the hold of an open door ends. `who` is the holder, or "" if the holder is not known.
+    Silence is normal, because a robot in a doorway sends nothing."""
+    robot, let_go = "/" in who or not who, "find out who holds the door"
+    if robot and clock.now.at - since.at <= LONG_S:
         found.say(
             f"{said} A robot in the doorway sends nothing until it has driven through.",
             "the robot",
-            f"{who} has to drive through; then its fleet adapter sends CLOSE. If {door.name} stays open"
-            " for more than a minute, a person has to look into the doorway",
+            f"{who or 'the robot'} has to drive through; then its fleet adapter sends CLOSE. If"
+            f" {door.name} stays open for more than a minute, a person has to look into the doorway",
         )
         return
-    found.say(
-        f"{said} RMF has no time limit: a robot that died in the doorway, or a dashboard that somebody"
-        " left, keeps the door open for ever.",
-        "a person",
-        f"look into the doorway; only when the doorway is clear: `rmf-bridge send door"
-        f" {quote(door.name)} close --requester {quote(who)}`",
+    why = (
+        "RMF has no time limit: a robot that died in the doorway, or a dashboard that somebody left,"
+        " keeps the door open for ever."
+        if robot
+        else f"{who} is no robot's name (FLEET/ROBOT), so a dashboard or a person may have sent OPEN."
+        " The door stays open until the same name sends CLOSE."
     )
+    if who:
+        let_go = f"only when the doorway is clear: {_close(door, who)}"
+    found.say(f"{said} {why}", "a person", f"look into the doorway; {let_go}")
+
+
+def _close(door: DoorFacts, who: str) -> str:
+    """Return the command that ends this requester's hold."""
+    direct = " --direct" if door.last_heartbeat is None and door.sender == who else ""
+    return f"`rmf-bridge send door {quote(door.name)} close --requester {quote(who)}{direct}`"
