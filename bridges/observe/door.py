@@ -6,6 +6,7 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import words
+from bridges.messages.stamps import in_seconds
 from bridges.observe.device import Check, ObservedDevice, Wait
 from bridges.observe.limits import MOST_HOLDERS, REQUESTER_SILENT_S
 from bridges.observe.news import News
@@ -23,14 +24,17 @@ CROSSES_S: Final = 0.5
 heartbeat may be older than the heartbeat."""
 
 
-def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
-    """List the door's holders in a supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp)."""
+def sessions(heartbeat: d.SupervisorHeartbeat, door: str) -> list[d.Session]:
+    """List the door's holders in a supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp). A
+    session has its holder's name, and the stamp of the holder's OPEN."""
     return [
-        session.requester_id
-        for sessions in heartbeat.all_sessions
-        if sessions.door_name == door
-        for session in sessions.sessions
+        one for each in heartbeat.all_sessions if each.door_name == door for one in each.sessions
     ]
+
+
+def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
+    """List the names of the door's holders in a supervisor's heartbeat."""
+    return [one.requester_id for one in sessions(heartbeat, door)]
 
 
 def door_open(mode: str, heartbeat: str) -> tuple[Check, ...]:
@@ -57,6 +61,10 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
       time of that. A restart of the supervisor is the reason.
     - `asked`: the mode that the last request on `door_requests` asks for
     - `sender`: the sender of that request, who last repeated it at `asked_last`
+    - `released`: the time when the last holder left, or when `asked` became CLOSED
+    - `unanswered`: the first request of an adapter since the supervisor's last message. A living
+      supervisor answers a request with a heartbeat within a second.
+    - `stamps`: the stamp (s) of each holder's OPEN, by the heartbeat
     """
 
     kind = "door"
@@ -70,6 +78,9 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         self.asked: Fact | None = None
         self.asked_last = began
         self.sender = ""
+        self.released: Moment | None = None
+        self.unanswered: Moment | None = None
+        self.stamps: dict[str, float] = {}
 
     def facts(self, state: d.DoorState) -> dict[str, str]:
         """Return the mode that the state shows."""
@@ -118,9 +129,14 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
                 self.asked = Fact(wants, moment)
             elif self.asked.say(wants, moment):
                 yield News("passed on", moment, who, wants)
+            if wants == CLOSED:
+                self.released = self.asked.since
+            if who == SUPERVISOR:
+                self.unanswered = None
             if wants == CLOSED and who == SUPERVISOR:
                 yield from self._told_to_close(moment)
             return
+        self.unanswered = self.unanswered or moment
         self.forgotten.pop(who, None)
         one, new = self.requesters.ask(who, wants, moment, stands=self.is_silent(moment))
         one.stamp(moment, request.request_time)
@@ -138,6 +154,7 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
     def _drop(self, moment: Moment, who: str) -> News:
         """Drop a holder. If it sent no CLOSE, the supervisor has forgotten it."""
         one, held_s = self.requesters.get(who), moment.at - self.holders.pop(who).at
+        self.released = moment
         if one is not None and one.wants == OPEN:
             if len(self.forgotten) >= MOST_HOLDERS:
                 del self.forgotten[next(iter(self.forgotten))]
@@ -146,7 +163,10 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
 
     def _hear_heartbeat(self, moment: Moment, heartbeat: d.SupervisorHeartbeat) -> Iterator[News]:
         first, self.last_heartbeat = self.last_heartbeat is None, moment
-        found = [self.text(who) for who in listed(heartbeat, self.id)[:MOST_HOLDERS]]
+        self.unanswered = None
+        held = sessions(heartbeat, self.id)[:MOST_HOLDERS]
+        self.stamps = {self.text(one.requester_id): in_seconds(one.request_time) for one in held}
+        found = [*self.stamps]
         seen = not first or moment.at - self.began.at > REQUESTER_SILENT_S
         since = Moment(moment.at, moment.wall, seen)
         for who in [who for who in self.holders if who not in found]:
@@ -165,5 +185,11 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
             if one.wants == OPEN and one.met is None and self.matches(one):
                 one.met = moment
                 yield News("met", moment, one.who, requester=one)
-            if not one.asks(moment) and one.who not in self.holders:
+            if not one.asks(moment) and one.who not in self.holders and not self._may_hold(one):
                 self.requesters.drop(one.who)
+
+    def _may_hold(self, one: DeviceRequester) -> bool:
+        """Return whether this silent requester may hold the door, because no heartbeat tells who holds
+        it."""
+        asked = self.asked is not None and self.asked.value == OPEN
+        return asked and self.last_heartbeat is None and one.wants == OPEN

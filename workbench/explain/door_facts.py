@@ -1,7 +1,9 @@
 """Facts about one door, from its messages, and the door's story (a list of its events)."""
 
 from bridges.observe.device import Check
+from bridges.observe.diagnosis import Diagnosis
 from bridges.observe.door import OPEN, SUPERVISOR, ObservedDoor
+from bridges.observe.limits import SILENT_S
 from bridges.observe.news import News
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
@@ -24,9 +26,23 @@ class DoorFacts(Device, ObservedDoor):
 
     @property
     def hears_lists(self) -> bool:
-        """Return whether the listener can hear the supervisor's heartbeat. A recording by a door's
-        daemon has no heartbeat, so its listener does not know the holders."""
-        return self.last_heartbeat is not None or self.noted is None
+        """Return whether the listener can hear the supervisor's heartbeat. Without it, the listener
+        does not know the holders. A recording by a door's daemon has no heartbeat. Another recording
+        lacks the heartbeat if the supervisor's requests are heard and no heartbeat is."""
+        unrecorded = self.noted is not None or self.sender == SUPERVISOR
+        return self.last_heartbeat is not None or not unrecorded
+
+    def supervisor(self, now: Moment) -> Diagnosis | None:
+        """Return the present report of our door supervisor. Return None if there is no such report."""
+        return next((one for one in self.heard_from(now) if one.kind == SUPERVISOR), None)
+
+    def has_order(self, now: Moment) -> bool:
+        """Return whether the door's own daemon reports that it wants the door open."""
+        return self.kind in self.waits_said(now)
+
+    def unheeded(self, now: Moment) -> bool:
+        """Return whether the supervisor has answered no request for so long that it must be silent."""
+        return self.unanswered is not None and now.at - self.unanswered.at > SILENT_S
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
         """Return the conditions for which this requester's DoorOpen or DoorClose waits. If the
