@@ -222,7 +222,7 @@ def _of_faults(
     found: Answer, charger: ChargerFacts, coordinator: Diagnosis, around: common.OthersHeard
 ) -> Iterator[str]:
     named = re.compile(rf"(?<!\w){re.escape(charger.id)}(?!\w)")
-    for code, (detail, _) in coordinator.faults.items():
+    for code, detail in coordinator.every_fault:
         if named.search(detail):
             found.say(f"The coordinator has the fault {code}: {label(detail, 300)}.")
             _, do = around.remedies.get(code, ("", f"mend {code}"))
