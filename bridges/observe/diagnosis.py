@@ -55,7 +55,9 @@ class Diagnosis:
     - `kind`: the kind of the node's daemon
     - `name`: `<node>: <device>`
     - `last`: the time of the last status
-    - `faults`: maps the code of each fault to its detail and its beginning
+    - `faults`: maps the code of each fault to its detail and its beginning. If several faults of the
+      last status have the same code, the detail joins their details.
+    - `every_fault`: the code and the detail of each fault of the last status
     - `refused`: maps each reason for refusals to their number and the time of the last refusal
     """
 
@@ -65,6 +67,7 @@ class Diagnosis:
     message: str = ""
     values: Mapping[str, str] = field(default_factory=dict)
     faults: dict[str, tuple[str, Moment]] = field(default_factory=dict)
+    every_fault: tuple[tuple[str, str], ...] = ()
     refused: dict[str, tuple[int, Moment]] = field(default_factory=dict)
 
     @property
@@ -93,8 +96,19 @@ class Diagnosis:
         """Take the next status, and yield the news. `text` converts a name from the network to the form
         that is kept in memory. `sentence` converts the detail of a fault."""
         self.kind, self.last, self.message = kind_in(status), moment, status.message
-        self.values = {pair.key: pair.value for pair in status.values[:MOST_VALUES]}
-        codes = faults(status)[:MOST_CODES]
+        told, codes = status.values[:MOST_VALUES], [*dict.fromkeys(faults(status))][:MOST_CODES]
+        details = {code: [one.value for one in told if one.key == code] for code in codes}
+        self.every_fault = tuple(
+            (text(code), "" if one == "-" else sentence(one))
+            for code in codes
+            for one in details[code] or [""]
+        )
+        joined = {
+            code: "; ".join(one for one in every if one != "-")
+            for code, every in details.items()
+            if every
+        }
+        self.values = {pair.key: pair.value for pair in told} | joined
         yield from self.has(moment, {text(code): sentence(self.value(code)) for code in codes})
         for key, value in self.values.items():
             if key.startswith(REFUSED) and value.isdecimal() and len(value) <= 18:

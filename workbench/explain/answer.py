@@ -137,8 +137,8 @@ def unheard(device: Device, around: OthersHeard, lists: str = "") -> Answer:
     mean = next((f" (did you mean {name}?)" for name in others if [name.lower()] == near), "")
     if "/" in device.name:
         return answer.say(
-            f"Nothing was heard of a robot {device.name}: no request, no lift or charger that it has,"
-            f" and no place in a queue; {_others(around)}.",
+            f"Nothing was heard of a robot {device.name}: no request, no state of its fleet with"
+            f" this robot, no lift or charger that it has, and no place in a queue; {_others(around)}.",
             "a person",
             f"look at its fleet adapter, or correct the spelling of its name{mean}",
         )

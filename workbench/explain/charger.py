@@ -28,6 +28,8 @@ from workbench.explain.rows import label
 LONG_S: Final = 120.0
 """Time (s) that a robot normally needs to come to its charger. After this time, a person should look
 for the cause."""
+HARMLESS: Final = ("nothing:", "nothing to", "intended")
+"""The beginnings of the remedies that ask nobody to act."""
 REFUSED_LATELY_S: Final = 60.0
 SAYS_MORE: Final = (*LOST, "UNKNOWN_VENDOR_STATE")
 """Faults of a charger in error whose detail says more than the error's text."""
@@ -84,7 +86,7 @@ def _next(
     who = charger.robot.value
     match charger.condition.value:
         case "idle":
-            _idle(found, charger, clock)
+            _idle(found, charger, clock, around)
         case "assigned":
             waits = charger.waits_said(clock.now).get("charger", "")
             if STATION_NEXT in waits and charger.told("in_range", clock.now) == "yes":
@@ -123,7 +125,9 @@ def _next(
             )
 
 
-def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
+def _idle(
+    found: Answer, charger: ChargerFacts, clock: TimePhrases, around: common.OthersHeard
+) -> None:
     asking = [
         one
         for one in charger.requesters
@@ -131,7 +135,16 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         if not _is_refused(charger, one, clock)
     ]
     if not asking:
-        found.say("Nobody requests the charger.", "nobody", "there is nothing to do")
+        found.say("Nobody requests the charger.")
+        mend = [
+            code
+            for code in charger.faults(clock.now)
+            if not around.remedies.get(code, ("", ""))[1].startswith(HARMLESS)
+        ]
+        if first_causes.own_fault(found, charger, clock, around, codes=mend):
+            found.because = tuple(mend[1:])
+        else:
+            found.acts("nobody", "there is nothing to do")
         return
     first = asking[0]
     found.say(
@@ -191,10 +204,12 @@ def _refusal(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
     refusal = charger.refusal
     if refusal is None or clock.now.at - refusal.at.at > REFUSED_LATELY_S:
         return
-    found.say(
-        f"At {clock.time(refusal.at.wall)} {charger.name} refused {refusal.who} (request"
-        f" {refusal.request}): {refusal.text}."
-    )
+    at, request = clock.time(refusal.at.wall), f"(request {refusal.request})"
+    if charger.last_state is None:  # a coordinator refuses a request for a charger that it lacks
+        text = f"At {at} a request of {refusal.who} for {charger.name} {request} was refused"
+    else:
+        text = f"At {at} {charger.name} refused {refusal.who} {request}"
+    found.say(f"{text}: {refusal.text}.")
 
 
 def _coordinated(
@@ -222,7 +237,7 @@ def _of_faults(
     found: Answer, charger: ChargerFacts, coordinator: Diagnosis, around: common.OthersHeard
 ) -> Iterator[str]:
     named = re.compile(rf"(?<!\w){re.escape(charger.id)}(?!\w)")
-    for code, (detail, _) in coordinator.faults.items():
+    for code, detail in coordinator.every_fault:
         if named.search(detail):
             found.say(f"The coordinator has the fault {code}: {label(detail, 300)}.")
             _, do = around.remedies.get(code, ("", f"mend {code}"))

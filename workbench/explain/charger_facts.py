@@ -84,7 +84,10 @@ class ChargerFacts(Device, ObservedCharger):
         last = self.refusal
         if last is None or (last.request, last.text) != (label(refusal.request_id), text):
             self._untell(moment, DAEMON_REFUSES + text.partition(": ")[0])
-            self.tell(moment, f"{self.name} refuses {who}: {text}")
+            refused = (
+                f"{self.name} refuses {who}" if self.state else f"a request of {who} is refused"
+            )
+            self.tell(moment, f"{refused}: {text}")
         self.refusal = HeardRefusal(who, label(refusal.request_id), text, moment)
 
     def _untell(self, moment: Moment, text: str) -> None:

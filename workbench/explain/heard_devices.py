@@ -17,6 +17,7 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
 from bridges.messages.words import KINDS, Kind
+from bridges.observe.alarms import ObservedAlarm
 from bridges.observe.all_devices import Key, ObservedGraph
 from bridges.observe.diagnosis import COORDINATOR, Diagnosis
 from bridges.observe.limits import FLAPS, MOST_DEVICES
@@ -26,6 +27,7 @@ from workbench.explain import answer as common
 from workbench.explain import charger, door, first_causes, known_defects, lift, robot, workcell
 from workbench.explain.answer import Answer, FileReason, Remedies
 from workbench.explain.charger_facts import ChargerFacts
+from workbench.explain.charger_wishes import ChargerWishes, queue_of
 from workbench.explain.device import MOST_LINES, Device
 from workbench.explain.door_facts import DoorFacts
 from workbench.explain.explanation import Explained, Explanation, NextStep, StoryLine
@@ -36,6 +38,8 @@ from workbench.explain.rows import label
 from workbench.explain.workcell_facts import DispenserFacts, IngestorFacts, WorkcellFacts
 
 STORY_LINES: Final = 40
+MOVES: Final = ("the robot", "the fleet adapter")
+"""Parties that do nothing for a robot that must stand because of an alarm."""
 SHOWS_S: Final = 1.5
 """Time (s) from the moment for which the recorder kept a file until the device's states show the
 effect. States come at 1 Hz."""
@@ -84,6 +88,7 @@ class HeardDevices(ObservedGraph[Device]):
         self._due: dict[str, float] = {}
         self._then: dict[Key, tuple[Moment, Device, Mapping[str, Moment]]] = {}
         self.senders: Mapping[str, Sequence[str]] | None = None
+        self._wishes = ChargerWishes()
 
     def take(self, heard: Heard | Own) -> None:
         """Take the next message from the graph, or the next note of our recorder."""
@@ -95,6 +100,7 @@ class HeardDevices(ObservedGraph[Device]):
             return
         self.messages += 1
         self.hear(heard)
+        self._wishes.hear(heard.message, self.now)
         if isinstance(heard.message, d.DiagnosticStatus):
             self._refusal(self.now, heard.message)
 
@@ -155,41 +161,72 @@ class HeardDevices(ObservedGraph[Device]):
 
     def _askers(self) -> Iterator[str]:
         """Yield the robots that `asking` finds."""
-        every = (*self.spoke, *(_holder(one) for one in self.stated()), *self._queue())
+        holders = (_holder(one) for one in self.stated())
+        queue = queue_of(self._coordinator(silent=True))
+        every = (*self.spoke, *holders, *queue, *self._wishes.last, *self._wishes.members)
         return (who for who in every if all(who.rpartition("/")[::2]))
-
-    def _queue(self) -> dict[str, str]:
-        """Return robot -> the origin of its wish and the reason why it waits, by the coordinator."""
-        coordinator = self._coordinator()
-        told = coordinator.value("queue").split("; ") if coordinator else []
-        parts = (text.partition(" by ") for text in told)
-        return {who: f"{by}{rest}".strip() for who, by, rest in parts if by}
 
     def explain(
         self, kind: Explained, name: str, zone: tzinfo | None, remedies: Remedies | None = None
     ) -> Explanation:
         """Explain the device or robot at the time of the last message. `zone` is the time zone of the
         texts, or None for this machine's zone."""
+        clock = TimePhrases(self.now, zone)
         if kind != "robot":
-            return self._explain(kind, name, zone, remedies)
+            told = self._explain(kind, name, zone, remedies)
+            return self._alarmed(told, [one for one in self.alarms() if one.stands], clock)
         one = self.robot(name)
         who = one.who if one else self.asking(name)
+        told = self._explain_robot(who, one, clock, remedies or {})
+        fleet, every = who.rpartition("/")[0], [one for one in self.alarms() if one.stands]
+        mine = [one for one in every if not one.fleets or fleet in one.fleets.split(", ")]
+        return self._alarmed(told, mine, clock)
+
+    def _alarmed(
+        self, told: Explanation, alarms: Sequence[ObservedAlarm], clock: TimePhrases
+    ) -> Explanation:
+        """Say first which alarms make robots stand. If otherwise nobody has to act, or only a robot
+        that must stand, the next step is the end of the alarms."""
+        waits = ("nobody", *(MOVES if told.kind == "robot" else ()))
+        ends = [
+            NextStep(who, on_graph(what, self._graph)) for who, what in (a.ends for a in alarms)
+        ]
+        acts = bool(alarms) and all(step.who in waits for step in told.next)
+        return replace(
+            told,
+            now=(*(one.because(clock.time) for one in alarms), *told.now),
+            next=tuple(ends) if acts else told.next,
+        )
+
+    def _explain_robot(
+        self, who: str, one: ObservedRobot | None, clock: TimePhrases, remedies: Remedies
+    ) -> Explanation:
         assert who
-        clock, concerns = TimePhrases(self.now, zone), dict[str, Device]()
+        waiting, has = dict[str, Device](), dict[str, Device]()
         for device, wait in waits(self.stated(), who, self.now):
-            since = clock.since(wait.since)
-            concerns[f"waits for {device.kind} {device.name} ({label(wait.wants)}) {since}"] = (
-                device
-            )
-        if one is None:
-            has = (d for d in self.stated() if _holder(d) == who and d not in concerns.values())
-            concerns |= {f"has {device.kind} {device.name}": device for device in has}
-        told = {
-            does: self._explain(device.kind, device.id, zone, remedies)
-            for does, device in concerns.items()
-        }
-        began, queued = self.began or self.now, self._queue().get(who, "")
-        return robot.explanation(who, one, told, queued, clock, remedies or {}, began)
+            does = f"waits for {device.kind} {device.name} ({label(wait.wants)})"
+            waiting[f"{does} {clock.since(wait.since)}"] = device
+        for device, since in self._unstated(who):
+            waiting[f"has asked for {device.kind} {device.name} {clock.since(since)}"] = device
+        for device in self.stated():
+            if _holder(device) == who and device not in waiting.values():
+                has[f"has {device.kind} {device.name}"] = device
+        asked, held = (
+            {does: self._explain(o.kind, o.id, clock.zone, remedies) for does, o in found.items()}
+            for found in (waiting, has)
+        )
+        queued, began = queue_of(self._coordinator()).get(who, ""), self.began or self.now
+        wish = self._wishes.told(who, self._coordinator(silent=True), clock, ours=one is not None)
+        return robot.explanation(who, one, asked, held, queued, wish, clock, remedies, began)
+
+    def _unstated(self, who: str) -> Iterator[tuple[Device, Moment]]:
+        """Yield each lift, door and charger without a state that this robot has requested, and the time
+        of the request. Nothing repeats some of these requests."""
+        for device in self.known.values():
+            for one in device.requesters if device.state is None else ():
+                asks = one.ended is None and (device.kind != "charger" or one.asks(self.now))
+                if asks and who == (one.wants if device.kind == "charger" else one.who):
+                    yield device, one.since
 
     def _explain(
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None
@@ -212,10 +249,9 @@ class HeardDevices(ObservedGraph[Device]):
         met = bool(answer.fields) and all(field.met for field in answer.fields)
         if answer.because is None and not met:
             common.say_waits(answer, device, clock)
-        answer.now[:0] = self.because(clock.time)
-        if all(step.who == "nobody" for step in answer.next):
-            ends = [one.ends for one in self.alarms() if one.stands]
-            answer.next = [NextStep(*end) for end in ends] or answer.next
+        for one in robots(self.nodes) if device is last else ():
+            if one.who == _holder(device):
+                robot.say_stands(answer, one, clock, around.remedies, robot.IN_LIFT)
         if device is not last and last.state is not None:
             held = "" if kind == "door" else f"; held by {words.holder(last.state) or 'nobody'}"
             later = f"{words.condition(last.state)}{held}"
@@ -328,10 +364,11 @@ class HeardDevices(ObservedGraph[Device]):
         coordinator = self._coordinator()
         return coordinator is not None and name in coordinator.values
 
-    def _coordinator(self) -> Diagnosis | None:
+    def _coordinator(self, *, silent: bool = False) -> Diagnosis | None:
+        """Return the latest report of a coordinator; with `silent`, also of a silent one."""
         found = [one for one in self.nodes.values() if one.kind == COORDINATOR]
         said = [one for one in found if not one.name.endswith(": daemon")]
-        now = [one for one in said if one.is_current(self.now.at)]
+        now = [one for one in said if silent or one.is_current(self.now.at)]
         return max(now, key=lambda one: one.last.at, default=None)
 
     def _stepped(self, clock: TimePhrases) -> tuple[str, ...]:
@@ -360,7 +397,7 @@ def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
     if reason.code == REFUSED:
         do = "compare the refused request with the device's settings: the refusal says what differs"
     if do:
-        harmless = do.startswith(("nothing:", "nothing to", "intended"))
+        harmless = do.startswith(charger.HARMLESS)
         answer.next = [NextStep("nobody" if harmless else "a person", do)]
 
 

@@ -63,9 +63,7 @@ def _next(
 ) -> None:
     asks = [one for one in workcell.requesters if one.asks(clock.now)]
     if not asks:
-        queue = workcell.queue.value
-        left = f" Its state still lists {queue}, but no fleet adapter repeats it." if queue else ""
-        found.say(f"Nobody requests the workcell.{left}", "nobody", "there is nothing to do")
+        _unasked(found, workcell, clock, around)
         return
     waits = [one for one in asks if workcell.results.get(one.who) not in FINAL]
     first = (waits or asks)[0]
@@ -82,10 +80,34 @@ def _next(
     elif workcell.mode.value == "busy":
         found.say(said, "the controller", "finish its cycle")
     elif workcell.lists(first.who):
-        found.say(
-            said,
-            "the controller",
-            "become ready; the daemon's diagnostics give the reason (`waits`)",
-        )
+        why = "" if workcell.waits_said(clock.now) else "; why it is not ready is not known"
+        found.say(said, "the controller", f"become ready{why}")
     else:
         found.say(said, "the device's node", "list the request, and acknowledge it")
+
+
+def _unasked(
+    found: Answer, workcell: WorkcellFacts, clock: TimePhrases, around: common.OthersHeard
+) -> None:
+    """Explain a workcell for which no request comes. A request that the state lists may have been
+    repeated before we listened, or on a topic that was not recorded."""
+    queue, text = workcell.queue.value, "Nobody requests the workcell."
+    heard = [one.who for one in workcell.requesters if workcell.lists(one.who)]
+    if queue and len(heard) == len(queue.split(", ")):
+        text += f" Its state still lists {queue}, but no fleet adapter repeats it."
+    elif queue:
+        text = (
+            f"The workcell's state lists {queue}, and no such request was heard. Whether a fleet"
+            " adapter still waits is not known: requests may not have been recorded."
+        )
+    found.say(text)
+    if first_causes.own_fault(found, workcell, clock, around, codes=STOPS):
+        return
+    if workcell.mode.value == "busy":
+        found.acts("the controller", "finish its cycle")
+    elif workcell.mode.value == "offline":
+        found.acts("a person", "find out why the workcell is offline")
+    elif queue and not heard:
+        found.acts("a person", "find out why the workcell does not serve what it lists")
+    else:
+        found.acts("nobody", "there is nothing to do")

@@ -229,7 +229,7 @@ def _coordinates(diagnosis: Diagnosis) -> str:
 
 def _faults(found: Iterable[Diagnosis]) -> str:
     """Return one text for each fault, such as `OVERLOAD (since 3 s)`."""
-    told = [(code, one.value(code)) for one in found for code in one.faults]
+    told = [pair for one in found for pair in one.every_fault]
     texts = [f"{code} ({detail})" if detail else code for code, detail in told]
     return words.printable("; ".join(dict.fromkeys(texts)))
 

@@ -4,6 +4,7 @@ repeat the words that the daemon publishes."""
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
@@ -16,7 +17,14 @@ from workbench.graph.board import Board, BoardRow
 
 REMEDIES = {
     code: (f"the cause of {code}", f"mend {code}")
-    for code in ("ROBOT_SILENT", "ROBOT_FAULT", "ROBOT_OFF_GRAPH", "ROBOT_PAUSED_BY_OTHERS")
+    for code in (
+        "ROBOT_NOT_READ",
+        "CHARGER_REPORTS_ERROR",
+        "ROBOT_SILENT",
+        "ROBOT_FAULT",
+        "ROBOT_OFF_GRAPH",
+        "ROBOT_PAUSED_BY_OTHERS",
+    )
 }
 
 
@@ -93,6 +101,12 @@ def test_a_robot_without_a_trouble_is_explained_by_its_mission(
     ("code", "detail", "sentence"),
     [
         ("ROBOT_SILENT", "no answer", "tiny/AMR01 is silent: no answer."),
+        ("ROBOT_NOT_READ", "old", "tiny/AMR01 cannot be read: old."),
+        (
+            "CHARGER_REPORTS_ERROR",
+            "E1",
+            "tiny/AMR01 is at a charger in error, or was sent there: E1.",
+        ),
         ("ROBOT_FAULT", "motor hot", "tiny/AMR01 reports a fault of its own: motor hot."),
         ("ROBOT_OFF_GRAPH", "9 m off", "tiny/AMR01 is off the graph: 9 m off."),
         ("ROBOT_PAUSED_BY_OTHERS", "so", "tiny/AMR01 was paused by somebody else: so."),
@@ -191,12 +205,100 @@ def test_a_robot_of_another_fleet_is_explained_by_the_lift_that_it_waits_for_or_
     assert any("tiny/AMR02" in text for text in told.now)
     assert told.notes == (OF_OTHERS,)
     assert "tiny/AMR02" in of_others("tiny/AMR02", *heard).now[0]
-    opens = d.DoorRequest(stamp(0.0), "tiny/AMR04", "ward", d.DoorMode(2))
-    told = of_others("AMR04", Heard(0.0, 1_700_000_000.0, "/adapter_door_requests", opens))
+
+
+def test_a_robot_that_was_heard_without_a_wish_waits_for_nothing_that_was_heard() -> None:
+    fleet = d.FleetState("tiny", (d.RobotState("AMR04"),))
+    told = of_others("AMR04", Heard(0.0, 1_700_000_000.0, "/fleet_states", fleet))
     assert told.now == (
         "tiny/AMR04 waits for no lift, door or charger that was heard, and has none.",
     )
     assert [step.who for step in told.next] == ["a person"]
+
+
+@pytest.mark.parametrize("ours", [True, False])
+def test_a_robot_that_asks_for_a_device_without_states_waits_for_that_device(ours: bool) -> None:
+    known = d.LiftState(stamp(0.0), "Lift1", ("L1",), "L1", "", 0, session_id="other/x")
+    asks = d.LiftRequest("lift1", stamp(0.0), "tiny/AMR01", 1, "L2", 2)
+    heard = [
+        Heard(0.0, 1_700_000_000.0, "/lift_states", known),
+        Heard(0.2, 1_700_000_000.2, "/adapter_lift_requests", asks),
+    ]
+    if ours:
+        heard.append(reported(2.0))
+    told = of_others("tiny/AMR01", *heard)
+    assert told.now[0].startswith("tiny/AMR01 has asked for lift lift1 since ")
+    assert told.now[1].startswith("Nobody publishes a state of lift1")
+    assert "did you mean Lift1?" in told.next[0].what
+
+
+def test_an_alarm_is_said_first_and_its_end_is_the_next_step_of_a_robot() -> None:
+    for fleets, stands in (("-", True), ('["tiny"]', True), ('["big"]', False)):
+        stated = {"alarm state": "alarm", "alarm causes": "fire_panel", "alarm fleets": fleets}
+        message = diagnosis("panel", "alarm", stated, {}, stamp(9.0))
+        panel = Heard(9.0, 1_700_000_009.0, "/diagnostics", message)
+        told = explained(panel, reported(10.0, doing="navigate to L1 ward"))
+        assert ("must stand still because fire_panel" in told.now[0]) == stands
+        assert [step.who for step in told.next] == ["a person" if stands else "the robot"]
+
+
+def test_a_robot_of_our_fleet_that_has_a_lift_is_explained_by_that_lift_too() -> None:
+    heard = [one for at in range(20) for one in lift(float(at))]
+    report = reported(19.5)
+    mine = [
+        replace(one, message=replace(one.message, session_id="tiny/AMR01"))
+        if isinstance(one.message, d.LiftState)
+        else replace(one, message=replace(one.message, session_id="tiny/AMR02"))
+        for one in heard
+        if isinstance(one.message, d.LiftState | d.LiftRequest)
+    ]
+    told = explained(*mine, report, until=19.6)
+    assert told.now[:2] == (
+        "tiny/AMR01 has no mission: RMF has given it nothing to do.",
+        "tiny/AMR01 has lift Lift1.",
+    )
+    assert "tiny/AMR02 has waited" in told.now[2]
+    assert [step.who for step in told.next] == ["a person"]
+
+
+def test_a_fault_of_the_robot_that_has_a_lift_is_told_of_the_lift() -> None:
+    site = HeardDevices()
+    for at in range(8):
+        for one in lift(float(at)):
+            if isinstance(one.message, d.LiftState):
+                site.take(replace(one, message=replace(one.message, session_id="tiny/AMR01")))
+            elif isinstance(one.message, d.LiftRequest):
+                site.take(one)
+    site.take(reported(7.5, ("ROBOT_FAULT", "motor hot")))
+    told = site.explain("lift", "Lift1", None, REMEDIES)
+    assert "tiny/AMR01 reports a fault of its own: motor hot." in told.now
+    assert NextStep("a person", "mend ROBOT_FAULT") in told.next
+    assert not any(step.what.startswith("tiny/AMR01 has to") for step in told.next)
+    own = site.explain("robot", "AMR01", None, REMEDIES).now
+    assert len(set(own)) == len(own), "the lift's sentences do not repeat the robot's"
+    site.take(reported(7.6, ("ROBOT_ON_OTHER_MAP", "normal in a lift")))
+    assert not any("map" in text for text in site.explain("lift", "Lift1", None).now)
+
+
+@pytest.mark.parametrize(
+    ("code", "detail", "sentence"),
+    [
+        ("RMF_TAKES_NO_ROBOT", "AMR02: x; y", ""),
+        ("RMF_TAKES_NO_ROBOT", "AMR01: off the graph", "RMF's adapter does not take tiny/AMR01"),
+        ("NO_ROUTER", "no answer", "The daemon of tiny/AMR01 has the fault NO_ROUTER: no answer."),
+        ("PASSIVE", "so", "The daemon of tiny/AMR01 has the fault PASSIVE: so."),
+    ],
+)
+def test_a_fault_of_the_fleets_daemon_says_why_a_robot_has_no_mission(
+    code: str, detail: str, sentence: str
+) -> None:
+    other = {"code": code, "detail": "AMR09: y"}
+    daemon = {"fleet": "tiny", "faults": [{"code": code, "detail": detail}, other]}
+    robot = {"doing": "nothing", "faults": [], "input_age_s": 0.2}
+    message = diagnosis("robots", "fleet", daemon, {"AMR01": robot}, stamp(10.0))
+    told = explained(Heard(10.0, 1_700_000_010.0, "/diagnostics", message))
+    assert told.now[0].startswith(sentence or "tiny/AMR01 has no mission")
+    assert told.next[0].what == (f"mend {code}" if sentence else "there is nothing to do")
 
 
 def test_a_robot_in_the_coordinators_queue_is_explained_by_the_reason_in_the_queue() -> None:
@@ -205,9 +307,7 @@ def test_a_robot_in_the_coordinators_queue_is_explained_by_the_reason_in_the_que
     assert told.now == (
         "tiny/AMR03 waits in the coordinator's queue, by the robot: charger_a charges tiny/AMR01.",
     )
-    assert told.next == (
-        NextStep("the coordinator", "give it a charger that suits it and is free"),
-    )
+    assert told.next == (NextStep("nobody", "wait until tiny/AMR01 leaves charger_a"),)
     assert of_others("porter/P 1", coordinated(9.0, queue)).device == "porter/P 1"
     ours = explained(
         reported(9.0), coordinated(9.5, "tiny/AMR01 by the robot: charger_a is silent")

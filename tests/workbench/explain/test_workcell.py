@@ -46,10 +46,17 @@ def result(at: float, status: int) -> tuple[float, str, Any]:
     [
         (states(9, 0), "Nobody requests the workcell.", "nobody"),
         (
-            states(9, 0, "task"),
+            states(19, 0, "task") + asks(5),
             "Its state still lists task, but no fleet adapter repeats it.",
             "nobody",
         ),
+        (states(9, 0, "task"), "Whether a fleet adapter still waits is not known", "a person"),
+        (
+            states(9, 1, "task"),
+            "Whether a fleet adapter still waits is not known",
+            "the controller",
+        ),
+        (states(9, 2), "Nobody requests the workcell.", "a person"),
         (states(9, 2, "task") + asks(9), "has had no answer", "a person"),
         (states(9, 1, "task") + asks(9), "Request task has asked for 1 box", "the controller"),
         (states(9, 0, "task") + asks(9), "Request task has asked for 1 box", "the controller"),
@@ -63,6 +70,12 @@ def test_it_says_which_request_waits_and_who_must_act(lines: Any, says: str, who
     assert [step.who for step in found.next][:1] == [who]
 
 
+def test_why_a_cell_of_another_node_is_not_ready_is_not_known() -> None:
+    (step,) = told(*states(9, 0, "task"), *asks(9)).next
+    assert step.what == "become ready; why it is not ready is not known"
+
+
+@pytest.mark.parametrize("repeated_s", [9, 2])
 @pytest.mark.parametrize(
     ("code", "do"),
     [
@@ -72,10 +85,12 @@ def test_it_says_which_request_waits_and_who_must_act(lines: Any, says: str, who
         ("NOT_KEPT", "make room on the disk"),
     ],
 )
-def test_a_workcell_that_can_be_read_is_offline_for_its_fault(code: str, do: str) -> None:
+def test_a_workcell_that_can_be_read_is_offline_for_its_fault(
+    code: str, do: str, repeated_s: float
+) -> None:
     said = {"faults": [{"code": code, "detail": ""}]}
     site = HeardDevices()
-    for at, topic, message in sorted([*states(9, 2, "task"), *asks(9)], key=_at):
+    for at, topic, message in sorted([*states(9, 2, "task"), *asks(repeated_s)], key=_at):
         site.take(Heard(at, WALL + at, f"dispenser_{topic}", message))
         told = diagnosis("node", "dispenser", {}, {"store": said}, stamp(WALL + at))
         site.take(Heard(at, WALL + at, "diagnostics", told))
