@@ -64,7 +64,7 @@ def answer(
         found.say(old)
     if claim is not None and claim.ended is None and not claim.human:
         found.asks, found.fields = claim.who, _fields(lift, claim, clock)
-        found.notes += common.clock_of(claim)
+        found.notes += common.clock_of(claim, "lift")
     _why(found, lift, claim, clock, around)
     _others_wait(found, lift, claim, clock)
     return found
