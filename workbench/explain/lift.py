@@ -15,7 +15,7 @@ from workbench.explain import first_causes, lift_holder
 from workbench.explain.answer import Answer
 from workbench.explain.explanation import CheckedField
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.lift_ungranted import SETTLES_S, not_granted, not_passed_on
+from workbench.explain.lift_ungranted import SETTLES_S, not_granted, not_passed_on, not_served
 from workbench.explain.phrases import TimePhrases, listed
 from workbench.explain.rows import label
 
@@ -97,9 +97,11 @@ def _why(
         _lets_in(found, lift, clock)
         if not first_causes.own_fault(found, lift, clock, around, codes=AWAY):
             found.acts("a person", "find out why it is out of service, or cannot be read")
-    elif silent is not None and (silent.ended or silent.wants in (lift.floors or silent.wants)):
+    elif silent is not None and (silent.ended or lift.serves(silent)):
         not_passed_on(found, lift, silent, clock, around)
     elif lift.session.value != NOBODY:
+        if claim is not None and claim.ended is None and claim.who != lift.session.value:
+            not_served(found, lift, claim)
         _held(found, lift, clock, around)
     elif claim is not None and claim.ended is None:
         not_granted(found, lift, claim, clock)
@@ -183,6 +185,7 @@ def _others_wait(
         if one is not claim and one.who != lift.session.value and not lift.is_served(one)
     ]
     texts = [f"{one.who} at {one.wants} {clock.since(one.since)}" for one in others[:4]]
+    any(not_served(found, lift, one) for one in others)
     if texts:
         more = f", and {len(others) - len(texts)} more" if len(others) > len(texts) else ""
         found.say(
@@ -303,6 +306,9 @@ def _missing(
     """Explain which condition is not yet met for the robot that has the session. The conditions are
     mode, floor and door. But if the lift's daemon waits for the end of a fault, that fault is the
     cause."""
+    if not_served(found, lift, claim):
+        found.say(lift.keeps(clock.now))
+        return
     on = common.relays(lift, clock)
     _, _, ends = lift.waits_said(clock.now).get("lift", "").partition(UNTIL)
     if first_causes.own_fault(found, lift, clock, around, codes=ends.split(", ")):

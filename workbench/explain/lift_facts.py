@@ -46,6 +46,10 @@ class LiftFacts(Device, ObservedLift):
         served = self.state.available_floors[:200] if self.state else ()
         return tuple(map(label, served))
 
+    def serves(self, one: DeviceRequester) -> bool:
+        """Return whether the lift serves the requester's floor, as far as its states tell."""
+        return one.human or not self.floors or one.wants in self.floors
+
     def sender(self, who: str) -> str:
         """Name the sender of this session's requests on `lift_requests`. If the sender is unknown, name
         the likely senders."""

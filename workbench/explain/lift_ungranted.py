@@ -20,13 +20,7 @@ UNRECORDED: Final = (
 
 def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """Explain why the lift gives the requester no session, although the lift is free."""
-    if lift.floors and claim.wants not in lift.floors:
-        found.say(
-            f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
-            " the request is refused.",
-            "a person",
-            "give the floor the same name on RMF's map and in the lift's settings",
-        )
+    if not_served(found, lift, claim):
         return
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
         found.say("The request came a moment ago.", "the device's node", "grant the session")
@@ -54,6 +48,21 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
             "the device's node",
             "grant the session; the node's log says why it does not",
         )
+
+
+def not_served(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> bool:
+    """Check whether the requester asks for a floor that the lift does not serve. If so, explain this
+    and return True."""
+    if lift.serves(claim):
+        return False
+    found.say(
+        f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}, so it"
+        f" never fulfils the request of {claim.who}.",
+        "a person",
+        f"give the floor that {claim.who} asks for the same name on RMF's map and in the lift's"
+        " settings",
+    )
+    return True
 
 
 def _asks_for_another(
