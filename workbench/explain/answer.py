@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from typing import Final
 
 from bridges.blackbox.triggers import DIED, FAULT, REFUSED, WAITING
+from bridges.messages.words import Kind
 from bridges.observe.limits import CLOCKS_DIFFER_S
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
@@ -228,18 +229,25 @@ def clock_off(claim: DeviceRequester) -> bool:
     return claim.stamped and abs(claim.stamp_age_s) >= CLOCKS_DIFFER_S
 
 
-def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
-    """Note that a requester's clock differs from our clock. With such a clock, requests look too old or
-    too new."""
+def clock_of(claim: DeviceRequester, kind: Kind = "door") -> tuple[str, ...]:
+    """Note that a requester's clock differs from our clock, and what the supervisors of this kind of
+    device do with its requests (`bridges/kinds/shared/freshness.py`, workbench/rmf_model)."""
     if not clock_off(claim):
         return ()
-    side = "behind" if claim.stamp_age_s > 0 else "ahead of"
-    off = lasted(abs(claim.stamp_age_s))
-    return (
-        f"The requests of {claim.who} are stamped {off} {side} this clock. RMF's own supervisors do not"
-        " compare stamps. Our supervisors take a request with such a stamp for a copy of an old"
-        " request, until the request has been repeated for a while.",
+    behind, off = claim.stamp_age_s > 0, lasted(abs(claim.stamp_age_s))
+    effect = (
+        "The supervisors take such requests. But if the requester's clock is set back after an OPEN,"
+        " RMF's door supervisor drops a CLOSE that is older than the OPEN, and our door supervisor"
+        " takes this CLOSE only after 10 s of repeats."
     )
+    if kind == "lift":
+        ours = "may take the first request only when it has been repeated for a second"
+        effect = (
+            "RMF's lift supervisor does not compare stamps; our lift supervisor"
+            f" {ours if behind else 'takes such requests at once'}."
+        )
+    side = "behind" if behind else "ahead of"
+    return (f"The requests of {claim.who} are stamped {off} {side} this clock. {effect}",)
 
 
 def faults(
@@ -254,14 +262,20 @@ def faults(
 
 
 def relays(device: Device, clock: TimePhrases) -> str:
-    """Return a clause that lists the relays that are on. Return "" if the relays' state is unknown.
+    """Return a clause that lists the relays that are on. Return "" if the relays' state is unknown. It
+    is unknown if the device's state or a request has changed since the daemon's last report.
 
     An example is `; its daemon has these relays on: agv_request, call L3`.
     """
-    told = device.told("outputs", clock.now).replace("between_pulses", "hold_open in pulses")
-    shown = [part.removesuffix(" yes") for part in told.split(", ") if not part.endswith(" 0")]
-    if not told:
+    own = (one for one in device.heard_from(clock.now) if one.kind == device.kind)
+    said = next((one for one in own if "outputs" in one.values), None)
+    changes = [one.since.at for one in device.requesters]
+    if device.state is not None:
+        changes += [getattr(device, name).since.at for name in device.facts(device.state)]
+    if said is None or (said is not device.noted and said.last.at <= max(changes, default=0.0)):
         return ""
+    told = said.values["outputs"].replace("between_pulses", "hold_open in pulses")
+    shown = [part.removesuffix(" yes") for part in told.split(", ") if not part.endswith(" 0")]
     return (
         f"; its daemon has these relays on: {listed(shown)}"
         if shown != ["-"] and shown

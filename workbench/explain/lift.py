@@ -9,13 +9,13 @@ from typing import Final
 
 from bridges.observe.lift import NO_FLOOR, NOBODY
 from bridges.observe.limits import FLAPS
-from bridges.observe.requesters import DeviceRequester
+from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain import answer as common
 from workbench.explain import first_causes, lift_holder
 from workbench.explain.answer import Answer
 from workbench.explain.explanation import CheckedField
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.lift_ungranted import SETTLES_S, not_granted, not_passed_on
+from workbench.explain.lift_ungranted import SETTLES_S, not_granted, not_passed_on, not_served
 from workbench.explain.phrases import TimePhrases, listed
 from workbench.explain.rows import label
 
@@ -27,6 +27,10 @@ Only a fleet adapter that knows the recall floor sends this request.
 """
 FLOOR_S: Final = 20.0
 """Maximum normal time (s) that a car needs from one floor to the next."""
+ABANDONED_S: Final = 600.0
+"""Time (s) for which a robot that has stopped asking without END is told of an idle lift."""
+HARMLESS: Final = ("nothing", "intended")
+"""The beginnings of the remedies that need nobody."""
 LATCHED: Final = "FIRE_LATCHED"
 AWAY: Final = ("MANUAL", "OUT_OF_SERVICE")
 """Faults of a lift in OFFLINE mode that can be read."""
@@ -64,7 +68,7 @@ def answer(
         found.say(old)
     if claim is not None and claim.ended is None and not claim.human:
         found.asks, found.fields = claim.who, _fields(lift, claim, clock)
-        found.notes += common.clock_of(claim)
+        found.notes += common.clock_of(claim, "lift")
     _why(found, lift, claim, clock, around)
     _others_wait(found, lift, claim, clock)
     return found
@@ -80,6 +84,9 @@ def _why(
     """Find the cause. Look first for a fault of the lift itself. Then look whether requests reach the
     lift. Then look at the holder of the lift."""
     silent = lift.not_passed_on(clock.now)
+    recorded = lift.supervisor_last is not None or around.senders is not None
+    if silent is not None and not recorded and (silent.ended or lift.matches(silent)):
+        silent = None
     if first_causes.two_nodes(found, lift, clock, around, "lift_states"):
         return
     if lift.mode.value in ALARMS:
@@ -97,14 +104,72 @@ def _why(
         _lets_in(found, lift, clock)
         if not first_causes.own_fault(found, lift, clock, around, codes=AWAY):
             found.acts("a person", "find out why it is out of service, or cannot be read")
-    elif silent is not None and (silent.ended or silent.wants in (lift.floors or silent.wants)):
+    elif (unseen := lift.unseen(clock.now)) is not None:
+        _states_do_not_arrive(found, lift, unseen, clock)
+    elif silent is not None and (silent.ended or lift.serves(silent)):
         not_passed_on(found, lift, silent, clock, around)
     elif lift.session.value != NOBODY:
+        if claim is not None and claim.ended is None and claim.who != lift.session.value:
+            not_served(found, lift, claim)
         _held(found, lift, clock, around)
     elif claim is not None and claim.ended is None:
         not_granted(found, lift, claim, clock)
     else:
-        found.say("Nobody requests the lift.", "nobody", "there is nothing to do")
+        _idle(found, lift, clock, around)
+
+
+def _idle(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
+    """Explain a lift that nobody has or requests. A fault may need a person nevertheless, or the last
+    requester may wait unheard."""
+    found.say("Nobody requests the lift.")
+    needs = [
+        code
+        for code in lift.faults(clock.now)
+        if not around.remedies.get(code, ("", ""))[1].startswith(HARMLESS)
+    ]
+    if first_causes.own_fault(found, lift, clock, around, codes=needs):
+        found.because = tuple(needs[1:])
+        return
+    one = lift.unended
+    last = one.last.at if one else float("-inf")
+    unended = one and any(label(w) == one.who and m.at == last for w, m in around.spoke.items())
+    if one is None or not unended or clock.now.at - last > ABANDONED_S:
+        found.acts("nobody", "there is nothing to do")
+        return
+    found.say(
+        f"{one.who} asked for it at {one.wants or 'no floor'} until {clock.time(one.last.wall)}, and"
+        " has sent no END: its fleet adapter is gone or cut off, or has dropped the robot, or does not"
+        " hear the lift's states.",
+        "a person",
+        f"see whether {one.who} still waits; if so, look at its fleet adapter, and at the network of"
+        " the lift's daemon",
+    )
+
+
+def _states_do_not_arrive(
+    found: Answer, lift: LiftFacts, since: Moment, clock: TimePhrases
+) -> None:
+    """Explain that we hear the lift's states, but our supervisor does not hear them. Fleet adapters
+    that repeat their requests hear them too."""
+    found.because = ()
+    misses = f"The supervisor of {lift.name} has missed the lift's states {clock.since(since)}"
+    if lift.answered(clock.now):
+        found.say(
+            f"{misses}, though fleet adapters answer them: the supervisor is cut off.",
+            "a person",
+            "look at the network of the lift supervisor: `rmf-bridge doctor FILE` on its machine",
+        )
+    else:
+        found.say(
+            f"{misses}, though they are heard here: they do not reach the supervisor, and perhaps no"
+            " fleet adapter. A fleet adapter repeats a request only after a state, so a robot may wait"
+            " without a word.",
+            "a person",
+            f"look at the network between the daemon of {lift.name}, the lift supervisor and the fleet"
+            " adapters: `rmf-bridge doctor FILE` on their machines",
+        )
+    if lift.session.value != NOBODY:
+        found.say(lift.in_car(lift.session.value, clock.now))
 
 
 def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
@@ -183,6 +248,7 @@ def _others_wait(
         if one is not claim and one.who != lift.session.value and not lift.is_served(one)
     ]
     texts = [f"{one.who} at {one.wants} {clock.since(one.since)}" for one in others[:4]]
+    any(not_served(found, lift, one) for one in others)
     if texts:
         more = f", and {len(others) - len(texts)} more" if len(others) > len(texts) else ""
         found.say(
@@ -303,7 +369,10 @@ def _missing(
     """Explain which condition is not yet met for the robot that has the session. The conditions are
     mode, floor and door. But if the lift's daemon waits for the end of a fault, that fault is the
     cause."""
-    on = common.relays(lift, clock)
+    if not_served(found, lift, claim):
+        found.say(lift.keeps(clock.now))
+        return
+    on, comes = common.relays(lift, clock), clock.now.at - lift.floor.since.at < SETTLES_S
     _, _, ends = lift.waits_said(clock.now).get("lift", "").partition(UNTIL)
     if first_causes.own_fault(found, lift, clock, around, codes=ends.split(", ")):
         return
@@ -336,6 +405,12 @@ def _missing(
             "the controller",
             f"bring the car to {claim.wants}; if it does not, a person has to check the call's relay"
             " and its wire",
+        )
+    elif "hold_door" not in on and lift.motion.value != "stopped" and comes:
+        found.say(
+            f"The car has just come to {claim.wants}.",
+            "the controller",
+            f"stop the car and open the door at {claim.wants}",
         )
     elif on and "hold_door" not in on and lift.motion.value != "stopped":
         found.say(

@@ -17,6 +17,10 @@ HUMAN: Final = d.LiftRequestType.REQUEST_HUMAN_MODE
 DIRECT: Final = "the supervisor, or a person with `send --direct`,"
 """The likely sender of a request on `lift_requests`, if no fleet adapter was heard to send the same
 request."""
+UNSEEN: Final = "LIFT_SILENT"
+"""The fault of our supervisor that hears no state of a lift."""
+LINGERS_S: Final = 1.0
+"""The time (s) between two reports of our daemons. A report may show a fault that is over."""
 
 
 @dataclass(slots=True)
@@ -32,19 +36,48 @@ class Rides:
 
 
 class LiftFacts(Device, ObservedLift):
-    """A lift with its story (a list of its events). `kept` is the story of the last ride of session
-    `focus`."""
+    """A lift with its story (a list of its events).
+
+    - `kept`: the story of the last ride of session `focus`
+    - `flows`: the time since which the states come without a silence
+    - `unended`: the requester that was the last to stop asking without END
+    """
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
         self.rides = Rides()
         self.kept: tuple[StoryLine, ...] = ()
+        self.flows = began
+        self.unended: DeviceRequester | None = None
 
     @property
     def floors(self) -> tuple[str, ...]:
         """Return the floors that the lift serves."""
         served = self.state.available_floors[:200] if self.state else ()
         return tuple(map(label, served))
+
+    def serves(self, one: DeviceRequester) -> bool:
+        """Return whether the lift serves the requester's floor, as far as its states tell."""
+        return one.human or not self.floors or one.wants in self.floors
+
+    def unseen(self, now: Moment) -> Moment | None:
+        """Return the time since which our supervisor misses the lift's states, although we hear them.
+        Return None if it does not miss them."""
+        if self.first_state is None or self.is_silent(now):
+            return None
+        came = max(self.first_state.at, self.flows.at)
+        every = ((one.last, one.faults.get(UNSEEN)) for one in self.heard_from(now))
+        missed = ((last, fault[1]) for last, fault in every if fault)
+        return next((s for last, s in missed if last.at - max(came, s.at) >= LINGERS_S), None)
+
+    def answered(self, now: Moment) -> bool:
+        """Return whether a fleet adapter has lately repeated a request or END, as it does after a
+        state."""
+        return any(
+            (one.asks(now) and one.times > 1) or (one.ends(now) and one.end_last != one.ended)
+            for one in self.requesters
+            if one.own
+        )
 
     def sender(self, who: str) -> str:
         """Name the sender of this session's requests on `lift_requests`. If the sender is unknown, name
@@ -121,6 +154,10 @@ class LiftFacts(Device, ObservedLift):
     def notice(self, one: News) -> None:
         """Count rides and waits."""
         by = one.requester
+        if one.what == "states again":
+            self.flows = one.at
+        elif one.what == "gone":
+            self.unended = by
         if one.what == "met" and by and by.since.seen:
             waited = one.at.at - by.since.at
             if waited > self.rides.longest_s:

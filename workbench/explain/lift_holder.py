@@ -14,6 +14,8 @@ from workbench.explain.lift_ungranted import SETTLES_S
 from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
+ALARM: Final = "HOLDER_SILENT"
+"""The fault of our supervisor that hears no request of the holder."""
 LONG_S: Final = 60.0
 """Maximum normal time (s) from the moment at which all conditions are met until the robot drives
 off."""
@@ -35,6 +37,16 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
             "listen for longer",
         )
         return
+    if not lift.adapters_heard and around.senders is None and ALARM not in lift.faults(clock.now):
+        nor = " or `lift_requests`" if lift.supervisor_last is None else ""
+        found.say(
+            f"No request for {lift.name} was heard on `adapter_lift_requests`{nor}, but the recording"
+            f" may leave them out. So it is not known whether {holder} still requests the lift."
+            f" {lift.in_car(holder, clock.now)}",
+            "a person",
+            f"look where {holder} is, and record `/adapter_lift_requests` and `/lift_requests` too",
+        )
+        return
     since = f"since {clock.time(theirs.last.wall)}" if theirs else f"for at least {lasted(heard_s)}"
     found.because = ()
     found.say(
@@ -49,15 +61,20 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
             f"{holder} is no robot's name (FLEET/ROBOT), so a dashboard may have taken the lift."
         )
     elif speaks:
+        here = [one for one in lift.asking(clock.now) if one.who in speaks and one.times > 1]
+        deaf = "" if here else ", or does not hear the lift's states"
         found.say(
             f"The fleet adapter is running, because it sends messages for {listed(speaks)}. Therefore"
-            f" {holder} is dead, or the adapter has dropped this robot."
+            f" {holder} is dead, or the adapter has dropped this robot{deaf}."
         )
     elif together or around.senders is not None:
         silent = f"Nothing from any robot of {fleet} was heard either"
         if together:
             silent = f"{listed([holder, *together])} fell silent together"
-        found.say(f"{silent}: the fleet adapter of {fleet} is gone or cut off.")
+        found.say(
+            f"{silent}: the fleet adapter of {fleet} is gone or cut off, or does not hear the lift's"
+            " states."
+        )
         look = (
             f"look into the car, then restart the fleet adapter of {fleet}. It then sends END for"
             f" {holder}: if {holder} stands in the car, give the robot a task within a minute, or take"
@@ -65,8 +82,8 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
         )
     else:
         found.say(
-            "Its fleet adapter is gone or cut off, or has dropped the robot. The messages do not tell"
-            " which."
+            "Its fleet adapter is gone or cut off, or has dropped the robot, or does not hear the"
+            " lift's states. The messages do not tell which."
         )
     found.say(lift.in_car(holder, clock.now), "a person", look)
 

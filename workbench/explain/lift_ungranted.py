@@ -3,16 +3,17 @@ request."""
 
 from typing import Final
 
-from bridges.observe.limits import CLOCKS_DIFFER_S
+from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.observe.requesters import DeviceRequester
-from workbench.explain import answer as common
 from workbench.explain.answer import Answer, OthersHeard
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.phrases import TimePhrases, lasted
+from workbench.explain.phrases import TimePhrases
 
 SETTLES_S: Final = 2.0
 """Normal time (s) from a request until the lift grants the session. After a session has ended, the
 supervisor needs the same time to turn to the next session."""
+SENDS: Final = ("for the lift to ", "for END of ")
+"""The beginnings of our supervisor's reason to wait while it sends requests to the lift's node."""
 UNRECORDED: Final = (
     "The lift was given to a robot, but nothing was heard on `lift_requests`: this topic is missing"
 )
@@ -20,13 +21,7 @@ UNRECORDED: Final = (
 
 def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """Explain why the lift gives the requester no session, although the lift is free."""
-    if lift.floors and claim.wants not in lift.floors:
-        found.say(
-            f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
-            " the request is refused.",
-            "a person",
-            "give the floor the same name on RMF's map and in the lift's settings",
-        )
+    if not_served(found, lift, claim):
         return
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
         found.say("The request came a moment ago.", "the device's node", "grant the session")
@@ -56,6 +51,38 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
         )
 
 
+def not_served(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> bool:
+    """Check whether the requester asks for a floor that the lift does not serve. If so, explain this
+    and return True."""
+    if lift.serves(claim):
+        return False
+    found.say(
+        f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}, so it"
+        f" never fulfils the request of {claim.who}.",
+        "a person",
+        f"give the floor that {claim.who} asks for the same name on RMF's map and in the lift's"
+        " settings",
+    )
+    return True
+
+
+def only_listens(found: Answer, lift: LiftFacts, clock: TimePhrases) -> bool:
+    """Check whether our supervisor has just started. If so, explain this and return True."""
+    if _reason(lift, clock) != LISTENS:
+        return False
+    found.say(
+        "The lift supervisor has just started, and only listens for some seconds.",
+        "nobody",
+        "wait a moment",
+    )
+    return True
+
+
+def _reason(lift: LiftFacts, clock: TimePhrases) -> str:
+    """Return our supervisor's reason why the requesters wait; "" if it gives none."""
+    return lift.waits_said(clock.now).get("lift_supervisor", "")
+
+
 def _asks_for_another(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> bool:
@@ -64,14 +91,17 @@ def _asks_for_another(
     passed = claim.passed_on
     if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
         return False
+    if only_listens(found, lift, clock):
+        return True
     other = lift.supervisor.value if lift.supervisor else ""
     instead = ""
     if other not in ("", claim.who):
         instead = f" {lift.sender(other).capitalize()} asks for {other}."
+    why = "" if _reason(lift, clock) else "; the supervisor's log says why it does not"
     found.say(
         f"The supervisor does not pass the request on.{instead}",
         "the supervisor",
-        f"pass on the request of {claim.who}; the supervisor's log says why it does not",
+        f"pass on the request of {claim.who}{why}",
     )
     return True
 
@@ -81,22 +111,33 @@ def not_passed_on(
 ) -> None:
     """Explain that nothing comes on `lift_requests`, although this robot sends requests or repeats
     END."""
-    if common.clock_off(claim) and claim.ended is None:
-        _clock(found, lift, claim)
-        return
     what = "repeats its END" if claim.ended else f"asks for {claim.wants or 'no floor'}"
     last, nodes = lift.supervisor_last, around.publishers("lift_requests")
     since = f" since {clock.time(last.wall)}" if last else ""
     says = f"{claim.who} {what} after each state, and nothing has come on `lift_requests`{since}:"
     restart = "restart the lift supervisor (rmf_lift_supervisor, or the one of rmf-bridges)"
+    if only_listens(found, lift, clock):
+        return
+    recorded = last is not None or around.senders is not None
+    reason = _reason(lift, clock)
     if any(one.kind == "lift_supervisor" for one in lift.heard_from(clock.now)):
-        reasons = ", ".join(lift.refusals(clock.now, clock.now.at - 30.0))
+        reasons = ", ".join(lift.refusals(clock.now, clock.now.at - 5.0))
+        if reason.startswith(SENDS) or not (reason or reasons or recorded):
+            found.say(
+                f"{says} the lift supervisor is running, and gives no reason not to pass it on, so its"
+                " messages may be lost, or missing in the recording.",
+                "a person",
+                "see whether the log of the lift's node has the request; if not, look at the network"
+                " of the lift supervisor",
+            )
+            return
         found.say(
             f"{says} the lift supervisor is running, but does not pass it on"
             + (f": it refuses the request, {reasons}." if reasons else "."),
             "a person",
-            "remove the cause for which the supervisor waits; `rmf-bridge status` on its machine names"
-            " the cause",
+            f"the supervisor waits {reason}: remove this cause"
+            if reason
+            else "see in the supervisor's log (`rmf-bridge log`) why it does not pass the request on",
         )
         return
     found.because = ()
@@ -106,7 +147,11 @@ def not_passed_on(
         found.say(f"{says} {nodes} publishes this topic, but hangs, is passive or is cut off.")
         restart = f"look at the log of {nodes}, then {restart}"
     else:
-        found.say(f"{says} the lift supervisor is not running, hangs, or is cut off.")
+        unheard = "" if recorded else ", or this topic was not recorded"
+        found.say(f"{says} the lift supervisor is not running, hangs, or is cut off{unheard}.")
+        restart = (
+            restart if recorded else f"see whether the lift supervisor runs; if not, {restart}"
+        )
     found.acts("a person", restart)
     if claim.ended:
         found.say(
@@ -114,19 +159,3 @@ def not_passed_on(
         )
     elif lift.session.value == claim.who:
         found.say(lift.in_car(claim.who, clock.now))
-
-
-def _clock(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> None:
-    """Explain that the supervisor drops requests because of wrong stamps."""
-    whose = f"the machine with the fleet adapter of {claim.who.rpartition('/')[0] or claim.who}"
-    if abs(lift.stamp_age_s) >= CLOCKS_DIFFER_S:
-        whose += ", or of this machine (the stamps of the lift's states differ from it too)"
-    side = "behind" if claim.stamp_age_s > 0 else "ahead"
-    found.because, found.notes = (), ()
-    found.say(
-        f"Nothing comes on `lift_requests` for {claim.who}, whose requests are stamped by a clock"
-        f" {lasted(abs(claim.stamp_age_s))} {side}: a supervisor that compares stamps regards the"
-        " requests as replays and drops them.",
-        "a person",
-        f"set the clock of {whose} (NTP); if that does not help, look at the supervisor's log",
-    )

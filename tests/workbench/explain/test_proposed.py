@@ -80,6 +80,8 @@ def test_nothing_heard_is_looked_into_on_that_graph() -> None:
 
 def test_a_name_of_several_words_is_one_word_of_the_command() -> None:
     site = HeardDevices("Lift; reboot", graph=GRAPH)
+    asks = d.LiftRequest("Lift; reboot", stamp(1e9), "b/c", 1, "L1", 2)
+    site.take(Heard(0.0, 1e9, "adapter_lift_requests", asks))  # so requests are recorded
     for n in range(9):
         state = d.LiftState(
             stamp(1e9 + n), "Lift; reboot", ("L1",), "L1", current_mode=2, session_id="a/b"
