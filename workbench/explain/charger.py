@@ -28,8 +28,6 @@ from workbench.explain.rows import label
 LONG_S: Final = 120.0
 """Time (s) that a robot normally needs to come to its charger. After this time, a person should look
 for the cause."""
-HARMLESS: Final = ("nothing:", "nothing to", "intended")
-"""The beginnings of the remedies that ask nobody to act."""
 REFUSED_LATELY_S: Final = 60.0
 SAYS_MORE: Final = (*LOST, "UNKNOWN_VENDOR_STATE")
 """Faults of a charger in error whose detail says more than the error's text."""
@@ -136,14 +134,7 @@ def _idle(
     ]
     if not asking:
         found.say("Nobody requests the charger.")
-        mend = [
-            code
-            for code in charger.faults(clock.now)
-            if not around.remedies.get(code, ("", ""))[1].startswith(HARMLESS)
-        ]
-        if first_causes.own_fault(found, charger, clock, around, codes=mend):
-            found.because = tuple(mend[1:])
-        else:
+        if not first_causes.needs_a_person(found, charger, clock, around):
             found.acts("nobody", "there is nothing to do")
         return
     first = asking[0]

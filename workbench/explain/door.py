@@ -30,8 +30,6 @@ the door moves. MOVES_S is the time for which the door moves."""
 AWAY: Final = ("offline", "unknown")
 FIRE: Final = "FIRE_ALARM"
 """The fault of a door in a fire alarm. A door that the daemon has then released is shown as unknown."""
-HARMLESS: Final = ("nothing:", "nothing to", "intended")
-"""The beginnings of the remedies of faults that need nobody."""
 RESTART: Final = (
     "restart the door supervisor (rmf_door_supervisor, or the one of rmf-bridges); look into the"
     " doorways first, because RMF's supervisor then lets go of every door whose holder is silent"
@@ -361,14 +359,6 @@ def _nobody_asks(
 
 def _idle(found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
     """Explain a closed door that nobody wants open. One of its faults may still need a person."""
-    faults = door.faults(clock.now)
-    for code in faults:
-        do = around.remedies.get(code, ("", ""))[1]
-        if do and not do.startswith(HARMLESS):
-            found.because = tuple(other for other in faults if other != code)
-            text = f"Nobody waits for the door, but its fault {code} needs a person."
-            found.say(text, "a person", do)
-            return
     heard = door.asked or door.last_heartbeat or door.unanswered or door.noted
     if heard is None and around.senders is None:
         found.say(
@@ -379,7 +369,9 @@ def _idle(found: Answer, door: DoorFacts, clock: TimePhrases, around: common.Oth
             " `/door_supervisor_heartbeat` too",
         )
         return
-    found.say("Nobody waits for the door.", "nobody", "there is nothing to do")
+    found.say("Nobody waits for the door.")
+    if not first_causes.needs_a_person(found, door, clock, around):
+        found.acts("nobody", "there is nothing to do")
 
 
 def _nobody_tells(

@@ -72,6 +72,8 @@ IF_SO: Final[Mapping[str, tuple[str, str]]] = {
     **dict.fromkeys(("FIRE_ALARM", "MANUAL", "OUT_OF_SERVICE", "OVERLOAD"), ("", "")),
 }
 """Faults that explain a device only in some states, with texts as in `OWN`."""
+HARMLESS: Final = ("nothing", "wait", "intended")
+"""The beginnings of the remedies that ask nobody to act at once."""
 READINGS: Final = ("INPUTS_NOT_FRESH", "COMMUNICATION_LOST")
 OFFLINE: Final = (*READINGS, "OUTPUTS_NOT_WRITTEN", "MANUAL", "OUT_OF_SERVICE")
 """Faults because of which a daemon publishes its device as OFFLINE."""
@@ -174,3 +176,18 @@ def own_fault(
         look.format(**names) or do,
     )
     return True
+
+
+def needs_a_person(found: Answer, device: Device, clock: TimePhrases, around: OthersHeard) -> bool:
+    """Check whether a device that nobody requests has a fault that needs a person. If so, explain this
+    and return True."""
+    faults = device.faults(clock.now)
+    for code, (detail, _) in faults.items():
+        cause, do = around.remedies.get(code, ("", "nothing"))
+        if not do.startswith(HARMLESS):
+            found.because = tuple(other for other in faults if other != code)
+            what = f"{code}: {detail.rstrip('.?')}" if detail else code
+            text = f"But {device.name} has a fault, {what}. The likely cause: {cause}."
+            found.say(text, "a person", do)
+            return True
+    return False

@@ -397,7 +397,7 @@ def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
     if reason.code == REFUSED:
         do = "compare the refused request with the device's settings: the refusal says what differs"
     if do:
-        harmless = do.startswith(charger.HARMLESS)
+        harmless = do.startswith(first_causes.HARMLESS)
         answer.next = [NextStep("nobody" if harmless else "a person", do)]
 
 

@@ -29,8 +29,6 @@ FLOOR_S: Final = 20.0
 """Maximum normal time (s) that a car needs from one floor to the next."""
 ABANDONED_S: Final = 600.0
 """Time (s) for which a robot that has stopped asking without END is told of an idle lift."""
-HARMLESS: Final = ("nothing", "intended")
-"""The beginnings of the remedies that need nobody."""
 LATCHED: Final = "FIRE_LATCHED"
 AWAY: Final = ("MANUAL", "OUT_OF_SERVICE")
 """Faults of a lift in OFFLINE mode that can be read."""
@@ -122,13 +120,7 @@ def _idle(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.Oth
     """Explain a lift that nobody has or requests. A fault may need a person nevertheless, or the last
     requester may wait unheard."""
     found.say("Nobody requests the lift.")
-    needs = [
-        code
-        for code in lift.faults(clock.now)
-        if not around.remedies.get(code, ("", ""))[1].startswith(HARMLESS)
-    ]
-    if first_causes.own_fault(found, lift, clock, around, codes=needs):
-        found.because = tuple(needs[1:])
+    if first_causes.needs_a_person(found, lift, clock, around):
         return
     one = lift.unended
     last = one.last.at if one else float("-inf")

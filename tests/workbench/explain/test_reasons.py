@@ -72,7 +72,7 @@ def test_every_fault_for_which_a_file_is_kept_is_named_and_somebody_has_to_act(
     remedy = for_explain()[code][1]
     if found.next[0].who == "nobody":
         assert found.next[0].what == remedy
-        assert remedy.startswith(("nothing", "intended"))
+        assert remedy.startswith(("nothing", "wait", "intended"))
     assert [fault.code for fault in found.faults] == [code]
 
 
