@@ -156,8 +156,8 @@ LAWS: Final[tuple[Law[AlarmHistory], ...]] = (
     Law(
         "A2.told",
         "A node whose diagnostics state an alarm or a drill has published `true`",
-        "the node's diagnostics change from `quiet` to an alarm; a recording needs a message of the node"
-        " on the alarm's topic",
+        "the node's diagnostics change from `quiet` to an alarm; a recording needs an alarm message of"
+        " the node",
         "Robots obey messages. An alarm that only /diagnostics state stops no robot",
         HANDLES,
         _told,
