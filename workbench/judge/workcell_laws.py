@@ -136,7 +136,7 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
         "a request that comes again after its result",
         "RMF repeats a request until a result comes. If a lost result is not repeated, the robot"
         " waits for ever",
-        SOURCE,
+        "rmf_ros2 phases/DispenseItem.cpp, IngestItem.cpp (_init_obs)",
         _repeats,
     ),
     named(
