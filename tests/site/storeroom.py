@@ -24,6 +24,7 @@ from tests.site.building import CONFIG, Device
 from tests.site.daemons import DeviceDaemon
 from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, Timeline
+from workbench.judge import judge as laws
 from workbench.judge.judge import Judge
 from workbench.judge.law import Verdict
 from workbench.rmf_model.workcells import WorkcellPhase
@@ -34,8 +35,8 @@ COMES_S = 90.0
 """The time (s) from the request until a person comes."""
 WAITS_S = 400.0
 """The longest permitted time of a delivery (s)."""
-LAWS = ("W1.numbers", "W2.lists", "W3.result", "W4.stamp")
-"""The laws that hold even if the daemon dies and results get lost."""
+LAWS = tuple(law.id for law in laws.LAWS["dispenser"] if law.id != "W4.rate")
+"""The laws that hold even if the daemon dies and results get lost. A dead daemon sends no states."""
 TROUBLES = ("nothing", "dies", "jam", "restart", "slow", "dies and is out of reach")
 
 Require = Callable[[bool, str], None]

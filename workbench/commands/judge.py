@@ -10,6 +10,7 @@ Exit codes:
 - 2: the command line is wrong.
 - 66: the recording cannot be read.
 - 69: no message was heard, the program could not join the graph, or the play was not performed.
+- 73: the file of `--junit` cannot be written.
 """
 
 import argparse
@@ -283,7 +284,10 @@ class Live:
         self._publishers: dict[str, Publisher[Message]] = {}
         live = [topic.live() for topic in OF_DEVICES]
         self._ear = Ear(transport, (*live, topics.FLEET_STATES), others_only=True)
-        self._retained = [transport.subscribe(topic, lambda message: None) for topic in ALARMS]
+        alarms = ALARMS if kind == "alarm" else (topics.FIRE_ALARM_TRIGGER,)
+        self._retained = {
+            topic.name: transport.subscribe(topic, lambda message: None) for topic in alarms
+        }
         allowed = {topic for name in beside for topic in BESIDE[name]}
         speaks = {topic.name for topic in performance.speaks} if performance else set()
         self._sole = sorted(speaks - allowed)
@@ -298,6 +302,16 @@ class Live:
         who = [name for name, topics in BESIDE.items() if set(topics) & set(found)]
         beside = " ".join(f"--beside {name}" for name in who)
         return f"other nodes publish on {', '.join(found)}; to play nevertheless, add {beside}"
+
+    def alarm_publishers(self) -> tuple[set[str], set[str]]:
+        """Return the nodes that publish alarms, and those of them that are volatile on no topic. For a
+        lift, only fire_alarm_trigger counts."""
+        names, volatile = set[str](), set[str]()
+        for topic, end in self._retained.items():
+            here = {*self._ear.ends[topic].senders()}
+            names |= here
+            volatile |= here - {*end.senders()}
+        return names, names - volatile
 
     def judge(self, judging: JudgeRun) -> None:
         """Run until there is a verdict. A play always releases the device before the play ends."""
@@ -323,9 +337,7 @@ class Live:
             names = self._states.senders()
             unnamed = ["?"] * (self._states.matched() - len(names))
             judging.judge.history.senders = (*names, *unnamed)
-            every = [n for topic in ALARMS for n in self._ear.ends[topic.name].senders()]
-            retain = [n for end in self._retained for n in end.senders()]
-            judging.judge.alarm_ends(every, retain, now, wall)
+            judging.judge.alarm_ends(*self.alarm_publishers(), now, wall)
         self._say(judging.turn(now, wall))
 
     def _say(self, said: list[Said]) -> None:

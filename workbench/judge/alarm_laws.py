@@ -47,13 +47,25 @@ def _others(history: AlarmHistory) -> Finding:
 
 
 def _same_fleets(history: AlarmHistory) -> Finding:
-    said, told = history.said, history.told_before
-    if said is None or said.on or told is None:
+    """Check that the node's `false` messages name all fleets of its alarm. A node may end its alarm
+    fleet by fleet. Only its diagnostics show that the alarm is over, and that fleets are left out."""
+    if history.said is not None:
+        is_end = history.told_before is not None and history.told is None
+        return KEPT if is_end else None
+    if not _left_out(history):
         return None
-    if not said.fleets or (told and told <= said.fleets):
-        return KEPT
-    left = ", ".join(map(shown, sorted(told - said.fleets))) or "the other fleets"
-    return f"its `false` leaves {left} standing"
+    text = f"its diagnostics state quiet, but its `false` leaves {_names(history)} standing"
+    return Doubt(text, lambda: _is_ended(history), TOLD_S)
+
+
+def _left_out(history: AlarmHistory) -> bool:
+    """Return whether the node states that its alarm is over, has sent `false`, and left out fleets."""
+    is_over = history.new and history.stated == "quiet"
+    return is_over and history.released_at > history.told_at and bool(history.unended)
+
+
+def _names(history: AlarmHistory) -> str:
+    return ", ".join(map(shown, sorted(history.unended or ())))
 
 
 def _again(history: AlarmHistory) -> Finding:
@@ -71,29 +83,39 @@ def _again(history: AlarmHistory) -> Finding:
 
 
 def _told(history: AlarmHistory) -> Finding:
-    hidden = history.hidden_at > history.quiet_at - TOLD_S  # perhaps the node's own `true`
-    if not (history.new and history.rose) or (history.told is None and hidden):
+    """Check that an alarm of the diagnostics has been published. A `true` of an earlier alarm counts
+    only as long as no `false` has ended it."""
+    if not (history.new and history.rose):
         return None
-    if history.told is not None:
+    if _is_told(history):
         return KEPT
+    if not history.hears or history.hidden_at > history.quiet_at - TOLD_S:
+        return None  # the node's own `true` may be hidden
     text = f"its diagnostics state {history.stated}, but it has published no `true`"
-    return Doubt(text, lambda: history.told is not None or not history.raised, TOLD_S)
+    return Doubt(text, lambda: _is_told(history) or not history.raised, TOLD_S)
+
+
+def _is_told(history: AlarmHistory) -> bool:
+    is_new = history.told_at > max(history.quiet_at - TOLD_S, history.released_at)
+    return is_new or history.unended is not None
 
 
 def _ends(history: AlarmHistory) -> Finding:
     if not history.new or history.stated != "quiet" or history.told_at < 0.0:
         return None
-    if history.ended_at >= history.told_at:
+    if history.unended is None:
         return KEPT if history.stated_before not in ("", "quiet") else None
+    fleets = f" for {_names(history)}" if history.unended else ""
     text = (
-        "its diagnostics state quiet, but nobody has published `false` since its `true`, so robots"
-        " stand for ever"
+        f"its diagnostics state quiet, but nobody has published `false`{fleets} since its `true`, so"
+        " robots stand for ever"
     )
     return Doubt(text, lambda: _is_ended(history), TOLD_S)
 
 
 def _is_ended(history: AlarmHistory) -> bool:
-    return history.stated != "quiet" or max(history.ended_at, history.hidden_at) >= history.told_at
+    unknown = history.is_vague or history.hidden_at >= history.told_at
+    return history.stated != "quiet" or history.unended is None or unknown
 
 
 def _retained(history: AlarmHistory) -> Finding:
@@ -125,8 +147,8 @@ LAWS: Final[tuple[Law[AlarmHistory], ...]] = (
     ),
     Law(
         "A1.fleets",
-        "A `false` names every fleet that the node's `true` has named",
-        "a `false` of the node after its `true`",
+        "The `false` messages of a node name every fleet that its `true` has named",
+        "a `false` that ends the node's alarm, or diagnostics that state `quiet` after a `false`",
         "A fleet that the `false` leaves out stands for ever",
         "EmergencySignal.msg, fleet_names",
         _same_fleets,
@@ -134,7 +156,8 @@ LAWS: Final[tuple[Law[AlarmHistory], ...]] = (
     Law(
         "A2.told",
         "A node whose diagnostics state an alarm or a drill has published `true`",
-        "the node's diagnostics change from `quiet` to an alarm",
+        "the node's diagnostics change from `quiet` to an alarm; a recording needs an alarm message of"
+        " the node",
         "Robots obey messages. An alarm that only /diagnostics state stops no robot",
         HANDLES,
         _told,
@@ -142,7 +165,7 @@ LAWS: Final[tuple[Law[AlarmHistory], ...]] = (
     Law(
         "A2.again",
         "A node repeats its `true` after another node's `false`, as long as its alarm lasts",
-        "another node's `false` while the node's diagnostics state an alarm",
+        "another node's `false` while the node's diagnostics state an alarm; both senders are known",
         "Otherwise the robots obey the `false`, and drive during the alarm",
         HANDLES,
         _again,

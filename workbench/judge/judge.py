@@ -115,6 +115,8 @@ class Judge:
         history = self.history
         if not isinstance(history, AlarmHistory | LiftHistory):
             return
+        if isinstance(history, AlarmHistory):
+            history.hears = True
         node = history.publisher if isinstance(history, LiftHistory) else history.name
         ours = _plain([node]) & _plain(names)
         found = bool(ours - _plain(retaining)) if ours else None

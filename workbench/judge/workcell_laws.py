@@ -6,17 +6,13 @@ from typing import Final
 
 from bridges.messages import definitions as d
 from bridges.messages import words
-from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
 from workbench.judge.shared_laws import ONE, RATE, STAMP, named, stamped
-from workbench.judge.workcell_history import WorkcellHistory
+from workbench.judge.workcell_history import HEARD_S, WorkcellHistory
 
 ACKNOWLEDGED, SUCCESS, FAILED = d.WorkcellStatus
 SOURCE: Final = "rmf_ros2 phases/DispenseItem.cpp, IngestItem.cpp (_get_status)"
 REPEATS_S: Final = 5.0
-HEARD_S: Final = 3.0
-"""Time (s) without a request after which RMF must have heard a result, because three repeats are
-missing."""
 
 
 def _numbers(history: WorkcellHistory) -> Finding:
@@ -55,30 +51,25 @@ def _leaves_done(history: WorkcellHistory) -> Finding:
 
     The message SUCCESS may get lost. Then RMF continues, and does not repeat the request, so that the
     node does not repeat SUCCESS. Therefore the first request without SUCCESS is no breach, but the
-    second is. After a FAILED, or a restart of the node, the first is a breach too. But if RMF has
-    stopped repeating the request after FAILED, its phase has ended, and the queue no longer matters.
+    second is. After a FAILED the first is a breach too. But if RMF has stopped repeating the request,
+    its phase has ended, and the queue no longer matters. The law is kept only if, at the end of the
+    judgement, every request that left had succeeded.
     """
-    waited_for = [guid for guid in history.left if not _has_failed(history, guid)]
-    for guid in waited_for:
-        result = history.results.get(guid)
-        if result == SUCCESS:
-            continue
-        if result != FAILED and len(history.unexplained) < 2 and history.before is not None:
-            return None
-        text = f"request {shown(guid)} left the queue without SUCCESS, so RMF sends the robot on"
-        return Doubt(text, partial(_succeeded, history, guid))
-    return KEPT if waited_for else None
+    for guid in history.left:
+        if not history.is_over(guid) and not _is_explained(history, guid):
+            text = (
+                f"request {shown(guid)} left the queue without SUCCESS, so RMF sends the robot on"
+            )
+            return Doubt(text, partial(_is_explained, history, guid))
+    unknown = history.unexplained or history.vanished
+    return KEPT if history.news is None and history.succeeded and not unknown else None
 
 
-def _has_failed(history: WorkcellHistory, guid: str) -> bool:
-    """Return whether RMF has heard that the request has FAILED. RMF repeats a request each second until
-    it hears a result (DispenseItem.cpp)."""
-    last = max([history.result_at.get(guid, NOT_YET), *history.asked_since.get(guid, ())])
-    return history.results.get(guid) == FAILED and history.now - last > HEARD_S
-
-
-def _succeeded(history: WorkcellHistory, guid: str) -> bool:
-    return history.results.get(guid) == SUCCESS
+def _is_explained(history: WorkcellHistory, guid: str) -> bool:
+    """Return whether the request has succeeded, or a single lost message SUCCESS explains that it has
+    left the queue."""
+    result = history.results.get(guid)
+    return result == SUCCESS or (result != FAILED and len(history.unexplained) < 2)
 
 
 def _keeps_result(history: WorkcellHistory) -> Finding:
@@ -92,10 +83,13 @@ def _keeps_result(history: WorkcellHistory) -> Finding:
 
 
 def _repeats(history: WorkcellHistory) -> Finding:
+    """Check at each state that the node has answered the requests that came before. A node that is
+    OFFLINE need not answer, because it may not know the outcome of the request."""
     if history.result is not None:
-        return KEPT if history.result_before == history.result.status else None
+        again = history.came_again and history.result_before == history.result.status
+        return KEPT if again else None
     for guid, status in history.results.items():
-        if history.waited_s(guid) > REPEATS_S:
+        if history.new is not None and history.waited_s(guid) > REPEATS_S:
             said = words.plain(d.WorkcellStatus, status)
             return f"request {shown(guid)} is {said}; RMF has repeated it for {REPEATS_S:g} s since"
     return None
@@ -121,7 +115,7 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
     Law(
         "W2.done",
         "A listed request leaves the queue only if the request has succeeded",
-        "a state that no longer lists a request",
+        "without a pause of the states, a newer state that no longer lists a request",
         "RMF counts a request that left the queue as complete, even if a FAILED comes with that state,"
         " and sends the robot off",
         SOURCE,
@@ -130,18 +124,19 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
     Law(
         "W3.result",
         "A result is final",
-        "two results for one request, if the first is SUCCESS or FAILED",
+        "two results for one request, if the first is SUCCESS or FAILED; a guid that RMF requests again"
+        f" after {HEARD_S:g} s names a new request",
         "RMF ends at the first result that it hears. Of two results, chance decides which comes first",
         SOURCE,
         _keeps_result,
     ),
     Law(
         "W3.repeats",
-        "A node repeats a result whenever the request comes again",
+        "A node that is not OFFLINE repeats a result whenever the request comes again",
         "a request that comes again after its result",
         "RMF repeats a request until a result comes. If a lost result is not repeated, the robot"
         " waits for ever",
-        SOURCE,
+        "rmf_ros2 phases/DispenseItem.cpp, IngestItem.cpp (_init_obs)",
         _repeats,
     ),
     named(

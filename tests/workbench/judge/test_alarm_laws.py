@@ -80,12 +80,15 @@ STORIES: dict[str, tuple[list[Heard], list[Heard], list[Heard]]] = {
     "A1.fleets": (
         [says(1.0, True, "panel", "x"), says(2.0, False, "lift", "y")],
         [says(1.0, True, "panel", "x", "y"), says(2.0, False, "panel", "y", "x", "z")],
-        [says(1.0, True, "panel", "x", "y"), says(2.0, False, "panel", "y")],
+        [
+            *(says(1.0, True, "panel", "x", "y"), says(2.0, False, "panel", "y")),
+            *stating("quiet", 3, 8),
+        ],
     ),
     "A2.told": (
         stating("alarm", 0, 9),
         ALARM,
-        [*stating("quiet", 0, 2), *stating("alarm", 2, 8)],
+        [*OVER, *stating("alarm", 14, 20)],
     ),
     "A2.again": (
         ALARM,
@@ -190,3 +193,75 @@ def test_an_alarm_of_another_building_may_end() -> None:
     lift = [says(0.5, True, "lift", "y"), *(states(n, "alarm", "lift", "y") for n in range(1, 9))]
     ours = [says(1.0, True, "panel", "x"), says(5.0, False, "panel", "x")]
     assert broken([*lift, *ours], "panel") == set()
+
+
+FLEETS = ("w", "x", "y", "z")
+
+
+def test_an_alarm_may_end_fleet_by_fleet() -> None:
+    begins = [says(1.0 + n / 100, True, "panel", fleet) for n, fleet in enumerate(FLEETS)]
+    ends = [says(9.0 + n, False, "panel", fleet) for n, fleet in enumerate(FLEETS)]
+    one_by_one = judged([*begins, *ends, *stating("quiet", 14, 20)])
+    assert (one_by_one["A1.false"], one_by_one["A1.fleets"]) == ("kept", "kept")
+    assert broken(ends, "panel") == set()  # the listener has missed each `true`
+    together = [says(1.0, True, "panel", *FLEETS), *ends, *stating("quiet", 14, 20)]
+    assert judged(together)["A1.fleets"] == "kept"
+    everywhere = [*stating("alarm", 0, 9), says(1.0, True), *ends, *stating("quiet", 14, 20)]
+    found = judged(everywhere)
+    assert {found[law] for law in ("A1.fleets", "A2.ends")} == {"not seen"}
+
+
+def test_a_false_for_other_fleets_leaves_the_alarm_standing() -> None:
+    named = [*stating("quiet", 0, 2), says(1.5, True, "panel", "x", "y"), *stating("alarm", 2, 8)]
+    quiet = stating("quiet", 9, 14)
+    assert broken([*named, says(8.5, False, "desk", "x"), *quiet], "panel") >= {"A2.ends"}
+    assert broken([*named, says(8.5, False, "panel", "x"), *quiet], "panel") >= {"A2.ends"}
+    both = [*named, says(8.5, False, "panel", "x"), says(8.6, False, "desk", "y")]
+    assert judged([*both, *quiet])["A2.ends"] == "kept"
+    everywhere = [*ALARM, says(7.5, False, "desk", "y"), says(7.6, True), *quiet]
+    assert judged(everywhere)["A2.ends"] == "broken"
+
+
+def test_a_true_for_other_fleets_does_not_repeat_the_alarm() -> None:
+    named = [*stating("quiet", 0, 2), says(1.5, True, "panel", "x", "y"), *stating("alarm", 2, 9)]
+    freed = [*named, says(3.2, False, "desk", "x")]
+    assert judged([*freed, says(3.3, True, "panel", "y")])["A2.again"] == "broken"
+    assert judged([*freed, says(3.3, True, "panel", "x")])["A2.again"] == "kept"
+    one_by_one = [says(3.3, True, "panel", "x"), says(3.4, True, "panel", "y")]
+    assert judged([*named, says(3.2, False, "desk"), *one_by_one])["A2.again"] == "kept"
+    everywhere = [*ALARM, says(3.2, False, "desk"), *one_by_one]
+    assert judged(everywhere)["A2.again"] == "not seen"
+
+
+def test_a_node_need_not_answer_a_false_whose_sender_or_order_nobody_knows() -> None:
+    hidden = [*stating("quiet", 0, 2), says(1.5, True, ""), *stating("alarm", 2, 12)]
+    hidden += [says(5.2, False, ""), says(5.3, True, "")]
+    assert set(judged(hidden).values()) == {"not seen"}
+    answered = [*ALARM, says(3.2, False, "desk"), says(3.3, True, "")]
+    assert judged(answered)["A2.again"] == "not seen"
+    retained = [*stating("alarm", 0, 8), says(0.1, True), says(0.15, False, "desk")]
+    assert set(judged([*retained, *stating("quiet", 8, 14)]).values()) == {"not seen"}
+
+
+def test_a_true_that_has_been_ended_tells_of_no_second_alarm() -> None:
+    first = [*ALARM, says(8.4, False, "desk"), *stating("quiet", 9, 12)]
+    assert judged([*first, *stating("alarm", 12, 18)])["A2.told"] == "broken"
+    assert judged([*first, says(11.9, True), *stating("alarm", 12, 18)])["A2.told"] == "kept"
+
+
+def test_a_recording_may_lack_the_alarms_topic() -> None:
+    lines = [*stating("quiet", 0, 2), *stating("alarm", 2, 8)]
+    assert judged(lines)["A2.told"] == "not seen"
+    live = Judge("alarm", "panel", only=["A2.told"])
+    live.alarm_ends([], [], 0.0, 0.0)
+    for line in lines:
+        live.hear(line)
+    assert live.broken
+
+
+def test_the_end_of_the_judgement_checks_no_message_again() -> None:
+    judge = Judge("alarm", "panel", only=["A1.false"])
+    for at in (1.0, 2.0, 3.0):
+        judge.hear(says(at, False))
+    [found] = judge.end(3.0, 3.0)
+    assert (found.times, len(found.evidence)) == (1, 1)

@@ -1,21 +1,26 @@
 """`rmf-bridge judge` as a command: its options, recordings and output."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
 from bridges.cli import main
 from bridges.messages import definitions as d
+from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.messages.releases import JAZZY
 from bridges.messages.stamps import stamp
+from bridges.messages.topics import VOLATILE, AnyTopic
 from tests.site.timeline import EPOCH
 from tests.workbench.judge.script import lift
 from tests.workbench.judge.test_adapter_occasions import STORIES
 from tests.workbench.replay.written import MCAP, SQLITE, write
+from workbench.commands.judge import Live
+from workbench.judge.judge import JudgedKind
 
 CALLED_BACK = STORIES["A7.rides"][2]
 CORPUS = Path(__file__).parents[1] / "replay" / "corpus"
@@ -141,3 +146,44 @@ def test_a_file_that_is_not_a_recording_or_cannot_be_written_is_reported(
     told = capsys.readouterr().err
     assert "is not a recording" in told
     assert f"{nowhere} cannot be written: No such file or directory" in told
+
+
+class Graph:
+    """A transport on which "/node" publishes on some topics. The value tells whether the publisher
+    retains its messages."""
+
+    def __init__(self, publishers: Mapping[AnyTopic, bool]) -> None:
+        self._publishers = {topic.name: retains for topic, retains in publishers.items()}
+
+    def subscribe(self, topic: AnyTopic, received: object, *, others_only: bool = False) -> "End":
+        retains = self._publishers.get(topic.name)
+        hears = retains is not None and (retains or topic.subscribe == VOLATILE)
+        return End(["/node"] if hears else [])
+
+
+class End:
+    def __init__(self, names: list[str]) -> None:
+        self.senders = lambda: names
+
+
+FIRE, SIGNAL = topics.FIRE_ALARM_TRIGGER, topics.EMERGENCY_SIGNAL
+
+
+@pytest.mark.parametrize(
+    ("kind", "publishers", "publishes", "retains"),
+    [
+        ("alarm", {FIRE: True, SIGNAL: True}, True, True),
+        ("alarm", {FIRE: False, SIGNAL: True}, True, False),
+        ("alarm", {SIGNAL: False}, True, False),
+        ("alarm", {}, False, False),
+        ("lift", {FIRE: False, SIGNAL: True}, True, False),
+        ("lift", {FIRE: True, SIGNAL: False}, True, True),
+        ("lift", {SIGNAL: False}, False, False),
+    ],
+)
+def test_the_publishers_of_the_two_alarm_topics_are_looked_at_one_by_one(
+    kind: JudgedKind, publishers: Mapping[AnyTopic, bool], publishes: bool, retains: bool
+) -> None:
+    graph: Any = Graph(publishers)
+    found = Live(graph, kind, [], None).alarm_publishers()
+    assert found == ({"/node"} if publishes else set(), {"/node"} if retains else set())

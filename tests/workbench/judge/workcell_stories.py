@@ -71,7 +71,7 @@ def stories(kind: JudgedKind, senders: Any, twins: Any) -> dict[tuple[JudgedKind
         (kind, "W3.repeats"): (
             served,
             [*served, of.ask(1.1), of.result(1.2, ACKNOWLEDGED)],
-            [*served, *(of.ask(1.1 + n) for n in range(8))],
+            [*served, *of.states(8.0, "a", begin=1.0), *(of.ask(1.1 + n) for n in range(8))],
         ),
         (kind, "W4.rate"): (
             [of.state(0.0)],
