@@ -299,9 +299,7 @@ def test_the_fault_of_an_idle_lift_is_somebodys() -> None:
     supervisor.start()
     scene.run(20.0)
     found = explained(scene.heard)
-    assert "Nobody requests the lift. But Lift1 has a fault, ROBOT_LEFT_IN_CAR" in said(
-        found
-    )
+    assert "Nobody requests the lift. But Lift1 has a fault, ROBOT_LEFT_IN_CAR" in said(found)
     assert who_acts(found) == ["a person"]
     assert steps(found)["a person"].startswith("look into the car")
 
