@@ -106,6 +106,12 @@ def _repeats(kind: str) -> Callable[[AdapterHistory], Finding]:
     return check
 
 
+REPEATS: Final = (
+    "three requests in a wait that is then fulfilled, four long gaps between the requests of a wait, or"
+    " two waits with 5 states without a request while fleet_states come"
+)
+
+
 def _changes(history: AdapterHistory) -> Wish | None:
     """If this request is for another floor than before, return a copy of the visit from before the
     request. Otherwise return None."""
@@ -271,7 +277,7 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A7.repeats",
         "While a robot waits for the lift, its adapter repeats the request after each state",
-        "three requests in one wait, or 5 states without a request while fleet_states come",
+        REPEATS,
         "A request may be lost, and a supervisor forgets requests in a restart",
         CONTEXT,
         _repeats("lift"),
@@ -320,7 +326,7 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A8.repeats",
         "While a robot waits for the door, OPEN is repeated each second",
-        "three requests in one wait, or 5 states without a request while fleet_states come",
+        REPEATS,
         "door_requests are not retained, and a supervisor forgets the robot in a restart",
         DOOR_OPEN,
         _repeats("door"),
@@ -336,7 +342,8 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A8.stops",
         "The adapter stops requesting OPEN after the door is open and the heartbeat lists the robot",
-        "CLOSE after the door has opened for the robot, or another OPEN 60 s after it has opened",
+        "CLOSE after the door has opened for the robot; or OPEN for 60 s after it has opened, or for 5"
+        " s in two passages in a row",
         "RMF's DoorOpen ends at these conditions. Each further OPEN renews the robot's hold",
         DOOR_OPEN,
         _stops_opening,

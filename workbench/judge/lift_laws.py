@@ -44,7 +44,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L4.own",
         "session_id is the session_id of a request for this lift",
-        "a session begins",
+        "a session begins, in messages that include lift_requests",
         "A robot enters only if session_id is the robot's own name, fleet/robot",
         REQUEST_LIFT,
         checks.own_name,
