@@ -132,7 +132,7 @@ class Judge:
         """End the judgement. `heard_s` is for how long (s) the judge has listened. Return each law with
         its verdict, in the laws' order."""
         self.history.pass_time(at, wall)
-        mute = heard_s > MUTE_S and bool(self.history.senders) and not self.history.others
+        mute = heard_s > MUTE_S and len(self.history.senders) > len(self.history.others)
         if self.history.states or mute:
             for tally in self._tallies:
                 self._check(tally, at, wall)

@@ -136,15 +136,6 @@ def test_a_doubt_at_the_end_of_the_network_is_no_breach(silent_s: float) -> None
     assert judged("lift", "L4.ends", [*ride, *seconds(10.0, 12.0, car)]) == "broken"
 
 
-def test_a_silent_publisher_beside_another_lift_may_be_that_lifts_stand_by() -> None:
-    judge = Judge("lift", "Lfit1", only=["L2.rate"])
-    judge.history.senders = ("/lift_node", "/standby")
-    for at, topic, message in seconds(0.0, 12.0, car):
-        judge.hear(Heard(at, at, topic.name, message, NODE))
-    [found] = judge.end(12.0, 12.0, 12.0)
-    assert found.verdict.value == "not seen"
-
-
 # ---- doors
 
 
