@@ -26,6 +26,10 @@ BACK_S: Final = 0.5
 AGAIN: Final = 2
 """Number of breaches in a row that count. A restart of the adapter or a step of its clock may explain
 one breach, but not so many."""
+PACE_S: Final = 0.5
+MISSED: Final = 3
+SLOW_S: Final = 3.2
+"""A gap (s) between two requests of a wait that is longer than two lost requests explain."""
 SPAM: Final = 5
 """Number of needless ENDs that is a breach, if they come at the pace of the lift's states."""
 ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name)
@@ -40,11 +44,21 @@ class Wish(DeviceRequester):
     - `inside`: whether the robot is in the car, because it requested another floor after `met`.
     - `came_from`: the floor that the robot requested before.
     - `held_at`: when a state last showed the robot's session.
+    - `device`: the device that the robot visits.
+    - `matched`: since when every state has fulfilled all of RMF's conditions for the latest request.
+    - `paced`: number of repeats of the latest request after a state, or after PACE_S.
+    - `unanswered`: number of states since the latest request.
+    - `slow`, `slow_s`: number and time (s) of the gaps between repeats that are longer than SLOW_S.
+    - `served`: whether a state may have fulfilled the latest request: the door was open, or the wish
+      was met. The heartbeat that lists a robot may be lost.
+    - `left`: whether the robot has used another device, or the door has closed, after `met`.
+    - `named`: whether the publisher of the latest request is known.
     - `ignored`: number of states in a row without a request by the robot, although its fleet was heard.
     - `ignored_since`: when the first of these states came.
-    - `lapsed`: whether the adapter sent the first request only once, and then ignored IGNORED states.
+    - `lapsed`: whether the adapter ignored IGNORED states in this wait.
+    - `proven`: whether the robot still waited then, as its session or a later request shows.
     - `spare`: times of the latest ENDs after the last state that showed the robot's session.
-    - `passed`: whether the robot asked for another door before it sent CLOSE for this door.
+    - `passed`: whether the visit counts as a passage without CLOSE.
     - `visits`: the kind of device and the robot's name, as a key for `AdapterHistory.lapses`.
     """
 
@@ -55,15 +69,29 @@ class Wish(DeviceRequester):
     ignored: int = 0
     ignored_since: float = NOT_YET
     lapsed: bool = False
+    proven: bool = False
+    device: AnyDevice | None = None
+    matched: Moment | None = None
+    paced: int = 0
+    unanswered: int = 0
+    slow: int = 0
+    slow_s: float = 0.0
+    served: bool = False
+    left: bool = False
+    named: bool = False
     spare: deque[float] = field(default_factory=lambda: deque(maxlen=SPAM))
     passed: bool = False
-
     visits: str = ""
 
     def ignored_s(self, now: float) -> float:
         """Return the time (s) for which the robot has sent no request although states came. Return 0
         for fewer than IGNORED states."""
         return now - self.ignored_since if self.ignored >= IGNORED else 0.0
+
+    @property
+    def repeated(self) -> bool:
+        """Return whether the adapter has repeated the latest request without a long gap."""
+        return self.paced >= AGAIN and not (self.slow or self.lapsed)
 
 
 class AdapterHistory(AnyHistory):
@@ -79,10 +107,13 @@ class AdapterHistory(AnyHistory):
     - `wish`: the visit to which the latest request belongs.
     - `was`: a copy of this visit from before the request.
     - `stated`: the visits to the device that published the latest state.
+    - `met`: the visits whose wish was met since the last check.
     - `listed`: the robots in the fleet's states. `present`: the robots in the latest of these states.
     - `lists`: number of fleet states heard.
     - `back`: when the stamps of the latest request's kind and robot last went back (AGAIN times).
-    - `lapses`: `Wish.visits` -> number of waits in a row in which the adapter sent only one request.
+    - `lapses`: `Wish.visits` -> number of waits in a row in which the adapter ignored IGNORED states.
+    - `overstays`: robot -> number of passages in a row in which OPEN was repeated for SLOWEST_S after
+      the door was open for the robot.
     - `unclosed`: robot -> number of passages in a row without CLOSE.
     """
 
@@ -102,12 +133,14 @@ class AdapterHistory(AnyHistory):
         self._backs: dict[str, deque[float]] = {}
         self.lapses: dict[str, int] = {}
         self.unclosed: dict[str, int] = {}
+        self.met: list[Wish] = []
+        self.overstays: dict[str, int] = {}
         self._wishes: dict[str, Wish] = {}
         self._asking: dict[str, None] = {}
         self._stating: dict[str, None] = {}
         self._tasks: dict[str, tuple[str, float]] = {}
         self._stamps: dict[str, tuple[float, deque[d.Message]]] = {}
-        self._alarm: d.Message = d.Bool(False)
+        self._alarms: dict[tuple[str, ...], bool] = {}
         self._began = self._alive_at = self._alarm_at = NOT_YET
 
     def take(self, heard: Heard, own: bool = False) -> bool:
@@ -132,10 +165,13 @@ class AdapterHistory(AnyHistory):
         match message:
             case d.FleetState():
                 self._list(message)
-            case d.EmergencySignal() | d.Bool() if message != self._alarm:
-                self._alarm, self._alarm_at = message, heard.at
+            case d.EmergencySignal():
+                self._hear_alarm(message.fleet_names, message.is_emergency)
+            case d.Bool():
+                self._hear_alarm(("", heard.topic), message.data)
             case d.LiftRequest() | d.DoorRequest() if found and heard.topic in ADAPTERS:
-                return self._ask(found[0], message, moment)
+                named = bool(heard.sender and heard.sender.node)
+                return self._ask(found[0], message, moment, named)
             case d.LiftState() | d.DoorState() if found:
                 return self._show(found[0], moment)
             case d.SupervisorHeartbeat():
@@ -146,6 +182,7 @@ class AdapterHistory(AnyHistory):
     def checked(self) -> None:
         """Forget how long the network was silent, after the laws have checked the latest message."""
         self.network_s = 0.0
+        self.met = []
 
     def is_ours(self, who: str) -> bool:
         """Return whether this requester is the judged robot, or a robot of the judged fleet."""
@@ -154,10 +191,20 @@ class AdapterHistory(AnyHistory):
     def excused(self, wish: Wish) -> bool:
         """Return whether the robot may change its route. A hazard, an alarm, or a new task since the
         robot's request is a good reason."""
-        state = self.device.state if self.device else None
+        state = wish.device.state if wish.device else None
         hazard = isinstance(state, d.LiftState) and state.current_mode in HAZARDS
-        task_at = self._tasks.get(wish.who, ("", NOT_YET))[1]
-        return hazard or self.now - self._alarm_at < ALARMS_S or task_at >= wish.since.at
+        alarm = any(self._alarms.values()) or self.now - self._alarm_at < ALARMS_S
+        return hazard or alarm or self._tasked_at(wish) >= wish.since.at
+
+    def _tasked_at(self, wish: Wish) -> float:
+        """Return when the robot's present task began."""
+        return self._tasks.get(wish.who, ("", NOT_YET))[1]
+
+    def _hear_alarm(self, source: tuple[str, ...], on: bool) -> None:
+        if on != self._alarms.get(source, False):
+            self._alarm_at = self.now
+        if source in self._alarms or len(self._alarms) < REMEMBERED:
+            self._alarms[source] = on
 
     def _forget(self, now: float) -> None:
         """Forget the visits. Nothing was heard on the whole network for a while, so the listener may
@@ -209,7 +256,13 @@ class AdapterHistory(AnyHistory):
             keep(self._backs, key, self.back)
         return False
 
-    def _ask(self, device: AnyDevice, message: d.LiftRequest | d.DoorRequest, now: Moment) -> bool:
+    def _ask(
+        self,
+        device: AnyDevice,
+        message: d.LiftRequest | d.DoorRequest,
+        now: Moment,
+        named: bool,
+    ) -> bool:
         who, ends = _who(message), _ends(message)
         if isinstance(message, d.LiftRequest):
             wants = message.destination_floor
@@ -224,6 +277,8 @@ class AdapterHistory(AnyHistory):
         key = f"{device.kind} {device.id} {who}"
         old = self._wishes.get(key)
         self.was = copy(old)
+        for other in self._wishes.values():
+            other.left |= other.who == who and other is not old and other.met is not None
         if old is None or (not ends and self._is_new_visit(device, old)):
             heard_long = now.at - self._began > REQUESTER_SILENT_S
             old = Wish(
@@ -235,16 +290,20 @@ class AdapterHistory(AnyHistory):
                 now,
                 whole=heard_long and not _holds(device, who),
                 visits=f"{device.kind} {who}",
+                device=device,
             )
             self._begin_passage(old, device)
             keep(self._wishes, key, old)
-        self.wish = old
+        self.wish, old.named = old, named
         self._say(old, "" if ends else wants, now)
         return True
 
     def _say(self, wish: Wish, wants: str, now: Moment) -> None:
         """Update the visit after a request. `wants` is empty for END and CLOSE."""
+        gap_s = now.at - wish.last.at
+        self._prove(wish, gap_s > SLOWEST_S and self._tasked_at(wish) < wish.last.at)
         if not wants:
+            self._leave(wish)
             wish.ended = wish.ended or now
             wish.spare.append(now.at)
             if isinstance(self.device, ObservedDoor):
@@ -252,16 +311,35 @@ class AdapterHistory(AnyHistory):
         elif wants != wish.wants:
             wish.inside = wish.inside or wish.met is not None
             wish.came_from, wish.wants, wish.since, wish.times = wish.wants, wants, now, 0
-            wish.met, wish.lapsed = None, False
-        elif wish.times and wish.ignored < IGNORED:
-            self.lapses[wish.visits] = 0
+            wish.met = wish.matched = None
+            wish.lapsed = wish.proven = wish.served = False
+            wish.paced = wish.slow = 0
+            wish.slow_s = 0.0
+        elif wish.times and not wish.served:
+            wish.paced += wish.unanswered > 0 or gap_s > PACE_S
+            timed = isinstance(self.device, ObservedDoor)  # a door's requests come each second
+            if gap_s > SLOW_S and (timed or wish.unanswered >= MISSED):
+                wish.slow, wish.slow_s = wish.slow + 1, wish.slow_s + gap_s
         wish.times += bool(wants)
-        wish.last, wish.ignored = now, 0
+        wish.last, wish.ignored, wish.unanswered = now, 0, 0
+
+    def _prove(self, wish: Wish, waited: bool) -> None:
+        """Count the wait if the adapter ignored IGNORED states in it, although the robot waited."""
+        if wish.lapsed and waited and not wish.proven:
+            wish.proven = True
+            keep(self.lapses, wish.visits, self.lapses.get(wish.visits, 0) + 1)
+
+    def _leave(self, wish: Wish) -> None:
+        """Note how long OPEN was repeated after the door was open for the robot."""
+        if isinstance(self.device, ObservedDoor) and wish.met and not wish.ended:
+            late = wish.matched is not None and wish.last.at - wish.matched.at > SLOWEST_S
+            keep(self.overstays, wish.who, self.overstays.get(wish.who, 0) + 1 if late else 0)
 
     def _is_new_visit(self, device: AnyDevice, wish: Wish) -> bool:
         silent_s = self.now - wish.last.at
         if wish.ended or not isinstance(device, ObservedLift):
-            return wish.ended is not None or silent_s > REQUESTER_SILENT_S
+            gone_s = REQUESTER_SILENT_S if wish.served or wish.met else GIVEN_UP_S
+            return wish.ended is not None or silent_s > gone_s
         return silent_s > GIVEN_UP_S and not _holds(device, wish.who)
 
     def _begin_passage(self, begun: Wish, device: AnyDevice) -> None:
@@ -269,9 +347,10 @@ class AdapterHistory(AnyHistory):
         if not isinstance(device, ObservedDoor) or begun.wants != "open":
             return
         for key, wish in self._wishes.items():
-            if key.startswith("door ") and wish.who == begun.who and not wish.ended:
-                if wish.met and not wish.passed:
-                    keep(self.unclosed, wish.who, self.unclosed.get(wish.who, 0) + 1)
+            if not key.startswith("door ") or wish.who != begun.who or wish.ended:
+                continue
+            if wish.met and wish.left and not wish.passed:
+                keep(self.unclosed, wish.who, self.unclosed.get(wish.who, 0) + 1)
                 wish.passed = True
 
     # ---- states
@@ -284,11 +363,14 @@ class AdapterHistory(AnyHistory):
         holder = device.session.value if isinstance(device, ObservedLift) else ""
         key = f"{device.kind} {device.id} {holder}"
         if self.is_ours(holder) and key not in self._wishes:
-            keep(self._wishes, key, Wish(holder, "", now, now, now, now))
+            keep(self._wishes, key, Wish(holder, "", now, now, now, now, device=device))
         self.stated = self._of(device)
         before = now.at - device.gap_s
         for wish in self.stated:
             self._count(wish, before)
+            opened = isinstance(device, ObservedDoor) and device.mode.value == "open"
+            wish.served |= opened
+            wish.left |= isinstance(device, ObservedDoor) and wish.met is not None and not opened
             if _holds(device, wish.who):
                 wish.held_at = self.now
                 wish.spare.clear()
@@ -305,15 +387,23 @@ class AdapterHistory(AnyHistory):
         elif self._alive_at > before:
             wish.ignored_since = wish.ignored_since if wish.ignored else before
             wish.ignored += 1
-        lapses = wish.times == 1 and not wish.met and not wish.ended
-        if lapses and wish.ignored_s(self.now) > SLOWEST_S and not wish.lapsed:
-            wish.lapsed = True
-            keep(self.lapses, wish.visits, self.lapses.get(wish.visits, 0) + 1)
+        wish.unanswered += 1
+        waits = wish.times and not (wish.met or wish.served or wish.ended)
+        wish.lapsed |= bool(waits and wish.ignored_s(self.now) > SLOWEST_S)
+        holds = wish.device is not None and _holds(wish.device, wish.who)
+        self._prove(wish, bool(waits) and holds and wish.ignored > 0)
 
     def _meet(self, device: AnyDevice, now: Moment) -> None:
         for wish in self._of(device):
-            if wish.met is None and not wish.ended and device.matches(wish):
+            if wish.ended or not device.matches(wish):
+                wish.matched = None
+                continue
+            wish.matched, wish.served = wish.matched or now, True
+            if wish.met is None:
                 wish.met = now
+                self.met.append(wish)
+                if wish.repeated:
+                    self.lapses[wish.visits] = 0
 
 
 def _who(message: d.LiftRequest | d.DoorRequest) -> str:

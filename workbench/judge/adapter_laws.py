@@ -11,7 +11,14 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.observe.lift import ObservedLift
 from bridges.observe.limits import REQUESTER_SILENT_S, SLOWEST_S
-from workbench.judge.adapter_history import AGAIN, SPAM, AdapterHistory, Wish
+from workbench.judge.adapter_history import (
+    AGAIN,
+    IGNORED,
+    SLOW_S,
+    SPAM,
+    AdapterHistory,
+    Wish,
+)
 from workbench.judge.history import NOT_YET, OFTEN_S
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
 
@@ -25,6 +32,9 @@ SPAM_S: Final = 10.0
 """The longest time (s) for SPAM needless ENDs at the pace of the states. A person's presses of a button
 are slower."""
 LISTS: Final = 5
+SLOW: Final = 4
+SLOW_PART: Final = 0.75
+OVERSTAYS: Final = 2
 TASKS_S: Final = 3.0
 """Maximum delay (s) from a new task to the fleet state that shows the task."""
 GOES: Final = (d.LiftRequestType.REQUEST_END_SESSION, d.LiftRequestType.REQUEST_AGV_MODE)
@@ -49,7 +59,10 @@ def _one_id(history: AdapterHistory) -> Finding:
     if history.wish is None or history.lists < LISTS or history.wish.ended:
         return None
     who = history.wish.who
-    return KEPT if who in history.listed else f"{shown(who)} is no robot in fleet_states"
+    if who in history.listed:
+        return KEPT
+    text = f"{shown(who)} is no robot in fleet_states"
+    return Doubt(text, lambda: who in history.listed, TASKS_S)
 
 
 def _stamps(history: AdapterHistory) -> Finding:
@@ -75,22 +88,28 @@ def _repeats(kind: str) -> Callable[[AdapterHistory], Finding]:
     """Return a check that the adapter repeats its requests during a wait. `kind` is lift or door."""
 
     def check(history: AdapterHistory) -> Finding:
-        wish, was = history.wish, history.was
-        if wish is not None and was is not None and history.device is not None:
-            same = wish.wants == was.wants and not (wish.ended or was.met)
-            repeats = same and wish.times > AGAIN and history.device.kind == kind
-            return KEPT if repeats else None
-        for one in history.stated:
-            if not isinstance(history.news, STATES[kind]):
-                return None
-            if one.lapsed and one.ignored and history.lapses.get(one.visits, 0) >= AGAIN:
-                return f"{shown(one.who)} asked for {shown(one.wants)} only once, and still waits"
-        return None
+        wish = history.wish
+        for one in [wish] if wish else history.stated:
+            if one.device is None or one.device.kind != kind:
+                continue
+            waits = f"{shown(one.who)} waits for {shown(one.wants)}"
+            if one.proven and (one.ignored or wish) and history.lapses.get(one.visits, 0) >= AGAIN:
+                return (
+                    f"{waits}, but it sent no request for {IGNORED} states or more, again and again"
+                )
+            waited_s = history.now - one.since.at
+            if wish and one.slow >= SLOW and one.slow_s > SLOW_PART * waited_s:
+                return f"{waits}, with {one.slow} gaps of more than {SLOW_S} s between its requests"
+        met = [one for one in history.met if one.device is not None and one.device.kind == kind]
+        return KEPT if any(one.repeated for one in met) else None
 
     return check
 
 
-STATES: Final = {"lift": d.LiftState, "door": d.DoorState}
+REPEATS: Final = (
+    "three requests in a wait that is then fulfilled, four long gaps between the requests of a wait, or"
+    " two waits with 5 states without a request while fleet_states come"
+)
 
 
 def _changes(history: AdapterHistory) -> Wish | None:
@@ -156,7 +175,8 @@ def _ends_again(history: AdapterHistory) -> Finding:
         return KEPT if again and len(wish.spare) == 1 else None
     for one in _holders(history):
         silent_s = one.ignored_s(history.now)
-        if one.ended and silent_s > SLOWEST_S:
+        limit_s = SLOWEST_S if one.named else NEVER_ENDS_S  # perhaps an END of another node
+        if one.ended and silent_s > limit_s:
             return f"{shown(one.who)} still has the lift, {silent_s:.1f} s after its last END"
     return None
 
@@ -204,10 +224,15 @@ def _stops_opening(history: AdapterHistory) -> Finding:
     wish, was = history.wish, history.was
     if wish is None or was is None or not was.met or not isinstance(history.news, d.DoorRequest):
         return None
+    times = history.overstays.get(wish.who, 0)
+    if wish.ended and times:
+        again = times >= OVERSTAYS and not was.ended
+        text = f"it repeated OPEN for more than {SLOWEST_S:.0f} s after the door was open for it"
+        return f"{text}, {times} times in a row" if again else None
     if wish.ended:
         return KEPT
-    open_s = history.now - was.met.at
-    goes_on = wish.met is was.met and open_s > FOR_EVER_S
+    open_s = history.now - was.matched.at if was.matched else 0.0
+    goes_on = wish.matched is was.matched and open_s > FOR_EVER_S
     return (
         f"still asks for OPEN, {open_s:.0f} s after the door opened for this robot"
         if goes_on
@@ -252,7 +277,7 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A7.repeats",
         "While a robot waits for the lift, its adapter repeats the request after each state",
-        "three requests in one wait, or 5 states without a request while fleet_states come",
+        REPEATS,
         "A request may be lost, and a supervisor forgets requests in a restart",
         CONTEXT,
         _repeats("lift"),
@@ -301,7 +326,7 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A8.repeats",
         "While a robot waits for the door, OPEN is repeated each second",
-        "three requests in one wait, or 5 states without a request while fleet_states come",
+        REPEATS,
         "door_requests are not retained, and a supervisor forgets the robot in a restart",
         DOOR_OPEN,
         _repeats("door"),
@@ -317,7 +342,8 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A8.stops",
         "The adapter stops requesting OPEN after the door is open and the heartbeat lists the robot",
-        "CLOSE after the door has opened for the robot, or another OPEN 60 s after it has opened",
+        "CLOSE after the door has opened for the robot; or OPEN for 60 s after it has opened, or for 5"
+        " s in two passages in a row",
         "RMF's DoorOpen ends at these conditions. Each further OPEN renews the robot's hold",
         DOOR_OPEN,
         _stops_opening,

@@ -80,12 +80,16 @@ class ChargerHistory(History[d.ChargerState]):
         an unrequested charge that has ended."""
         if self.before is None or _served(self.before) != _served(state):
             self.same_before, self.same_since = self.same_since, self.now
+        if self.before is None or self.before.request_id != state.request_id:
+            self.second_at = NOT_YET
         if state.state in (IDLE, RELEASED):
             self.cancels.pop(UNREQUESTED + self.name, None)
 
     def _cancel(self, request_id: str) -> None:
         shown = self.state is not None and request_id == self.state.request_id
-        if shown or request_id in self.requests:  # a cancel may also arrive before its request
+        ended = self.before is not None and request_id == self.before.request_id
+        ended = ended and not unrequested(request_id)  # the state may arrive before its cancel
+        if shown or ended or request_id in self.requests:  # or the cancel before its request
             keep(self.cancels, request_id, min(self.cancels.get(request_id, LOST), self.now))
         if self.state is not None and not shown:
             self.foreign_at = self.now

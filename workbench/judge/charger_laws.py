@@ -57,7 +57,7 @@ def _has_text(history: ChargerHistory) -> Finding:
     state = _known(history)
     if state is None:
         return None
-    if (state.state == ERROR) == bool(state.error_message):
+    if (state.state == ERROR) == bool(state.error_message.strip()):
         return KEPT
     if state.state == ERROR:
         return "ERROR, and error_message is blank"
@@ -70,22 +70,33 @@ def _same_robot(history: ChargerHistory) -> Finding:
     if state is None or state.state == IDLE:
         return None
     asked = history.requests.get(state.request_id)
-    if asked is None and state.request_id in history.elsewhere:
-        return f"the request is for another station: {words.described(state)}"
-    if asked is None:
+    if asked is None and state.request_id not in history.elsewhere:
         return None
-    wanted = asked.fleet_name, asked.robot_name
-    if _robot(state) == wanted:
+    if asked is not None and _is_of(state, asked):
         return KEPT
-    whose = f"request {shown(asked.request_id)} is for {shown('/'.join(wanted))}"
-    return f"{whose}: {words.described(state)}"
+    whose = (
+        f"request {shown(asked.request_id)} is for {shown(f'{asked.fleet_name}/{asked.robot_name}')}"
+        if asked
+        else "the request is for another station"
+    )
+
+    def excused() -> bool:
+        later = history.requests.get(state.request_id)
+        return later is not None and _is_of(state, later)
+
+    return Doubt(f"{whose}: {words.described(state)}", excused)
+
+
+def _is_of(state: d.ChargerState, request: d.ChargerRequest) -> bool:
+    return _robot(state) == (request.fleet_name, request.robot_name)
 
 
 def _keeps(history: ChargerHistory) -> Finding:
     """Check that a station serves one request until that request ends.
 
-    Two changes are allowed. First, the charge that nobody requested may become the charge of the robot
-    on the pad. Second, a restarted node may have forgotten the request that it served.
+    Three changes are allowed. First, the charge that nobody requested may become the charge of the
+    robot on the pad. Second, a restarted node may have forgotten the request that it served. Third, a
+    robot may leave the pad between two states, and the free station may then be ASSIGNED.
     """
     state, before = history.new, history.before
     if state is None or before is None or not {state.state, before.state} <= ENDS_WITHIN_S.keys():
@@ -94,20 +105,25 @@ def _keeps(history: ChargerHistory) -> Finding:
         return KEPT if history.was_tested(history.second_at) else None
     if unrequested(state.request_id) or not before.request_id or _is_over(history, before):
         return None
+    on_pad = before.state == CHARGING or unrequested(before.request_id)
+    if (on_pad and state.state == ASSIGNED) or not history.requests:
+        return None
     if unrequested(before.request_id) and before.robot_name and _robot(before) == _robot(state):
         return None
-    return f"the station was {_whose(before)}, and now is {_whose(state)}"
+    text = f"the station was {_whose(before)}, and now is {_whose(state)}"
+    return Doubt(text, lambda: before.request_id in history.cancels)
 
 
 def _is_over(history: ChargerHistory, before: d.ChargerState) -> bool:
-    """Return whether the assignment in the state `before` may have ended before the new state. A cancel
-    or the start_timeout may have ended it."""
-    if before.state != ASSIGNED or unrequested(before.request_id):
+    """Return whether the request in the state `before` may have ended before the new state. A cancel or
+    the start_timeout may have ended it."""
+    mine = before.request_id
+    if unrequested(mine) or mine in history.cancels:
+        return not unrequested(mine)
+    if before.state != ASSIGNED:
         return False
-    known = before.request_id in history.requests and before.request_id not in history.cancels
-    return (
-        not known or _overdue_s(history, before, history.first_asked[before.request_id]) > -SEEN_S
-    )
+    since = history.first_asked.get(mine)
+    return since is None or _overdue_s(history, before, since) > -SEEN_S
 
 
 def _overdue_s(history: ChargerHistory, state: d.ChargerState, since: float) -> float:
@@ -226,7 +242,8 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C1.keeps",
         "While a station is ASSIGNED or CHARGING, its request_id does not change; only a charge that"
-        " nobody requested (`unrequested/…`) may get the request_id of the robot on the pad",
+        " nobody requested (`unrequested/…`) may get the request_id of the robot on the pad, and only"
+        " a robot that leaves the pad may free the station for the next ASSIGNED",
         "a second request while the first is served",
         "The next robot's request must not take over a station that is promised to the first robot",
         "ChargerRequest.msg, request_id",

@@ -18,6 +18,9 @@ CROSSES_S: Final = 0.5
 """Maximum delay (s) from a CLOSE until the state that it has caused is heard."""
 DWELLS_S: Final = 0.5
 """Minimum time (s) for which a door operator keeps a door open for people."""
+FLICKERS_S: Final = 0.9
+"""Time (s) that is too short for a real door to close and open again."""
+LATE_S: Final = FLICKERS_S + 1.0
 OPENING_S: Final = 1.0
 """Minimum time (s) for which a door operator opens a door before the operator can reverse the door."""
 
@@ -38,6 +41,10 @@ class DoorHistory(History[d.DoorState]):
     - `instant`: how many times in a row the door showed OPEN immediately after the request.
     - `opened`: whether the latest state is the first OPEN state of this latch.
     - `shut`: how many times in a row RMF's CLOSE closed a door that people had opened.
+    - `asked_again_at`: time of the latest OPEN.
+    - `ours`: whether the judge itself sent the latest OPEN, so that no CLOSE can be lost.
+    - `lapses`: how many times in a row the held door closed, although neither a CLOSE nor another OPEN
+      was heard. One CLOSE may be lost.
     - `left`: whether people had opened the door, RMF sent CLOSE during that time, and the latest state
       shows that the door closes or is closed.
     """
@@ -47,11 +54,12 @@ class DoorHistory(History[d.DoorState]):
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.latched = self.was_open = self.opened = self.left = self.was_closed = False
+        self.ours = False
         self.asked_at = self.not_closed_at = self.closed_at = self.adapter_closed_at = NOT_YET
         self.openings = 0
         self.reopened: deque[float] = deque(maxlen=3)
-        self.instant = 0
-        self.shut = 0
+        self.instant = self.shut = self.lapses = 0
+        self.asked_again_at = NOT_YET
         self._left_open_at = NOT_YET
         self._people_at = self._people_open_at = self._people_close_at = NOT_YET
 
@@ -100,6 +108,10 @@ class DoorHistory(History[d.DoorState]):
         if self.mode in BLIND:
             self.was_open = False
             self._people_at = NOT_YET
+        unasked = self._left_open_at > max(self.asked_again_at, self.closed_at)
+        stays_shut = OPEN not in (self.mode, self.mode_before) and self.was_open and self.latched
+        if stays_shut and unasked and self.now - self._left_open_at > LATE_S:
+            self.lapses, self.latched, self.was_open = self.lapses + 1, False, False
         if self.mode != self.mode_before:
             self._changed()
 
@@ -143,9 +155,12 @@ class DoorHistory(History[d.DoorState]):
             self.openings = 0
             self.reopened.clear()
         self.openings += 1
+        self.asked_again_at, self.ours = self.now, self.own
         self._people_at = NOT_YET
 
     def _ask_close(self) -> None:
+        if self.latched and self.mode == OPEN:
+            self.lapses = 0
         self.latched, self.closed_at = False, self.now
         if self._people_at > NOT_YET and self._people_close_at == NOT_YET:
             self._people_close_at = self.now

@@ -3,7 +3,7 @@
 from typing import Final
 
 from bridges.messages import definitions as d
-from workbench.judge.door_history import BLIND, CLOSED, OPEN, DoorHistory
+from workbench.judge.door_history import BLIND, CLOSED, FLICKERS_S, LATE_S, OPEN, DoorHistory
 from workbench.judge.law import KEPT, Doubt, Finding, Law
 from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named, stamped
 
@@ -15,9 +15,7 @@ ASKED: Final = 5
 INSTANT: Final = 2
 SHUT: Final = 3
 BYPASS_S: Final = 5.0
-FLICKERS_S: Final = 0.9
-"""Time (s) that is too short for a real door to close and open again."""
-LATE_S: Final = FLICKERS_S + 1.0
+LAPSES: Final = 2
 _NUMBERS: Final = frozenset(d.DoorModeValue)
 
 
@@ -64,14 +62,22 @@ def _left(text: str, history: DoorHistory) -> Doubt:
     """Return a possible breach. It is excused if a CLOSE was still on its way. It is also excused if
     the door is soon open again, because another law covers a flickering contact.
 
+    A CLOSE may also be lost. RMF's supervisor sends OPEN to a closed door that a robot holds
+    (door_supervisor/Node.cpp). So the breach needs another OPEN, or LAPSES such doubts in a row.
+
     The time until then is measured by arrival and by stamps, because a busy network may deliver the
     next state late.
     """
-    left_at, read_at = history.now, history.seen.stamped_at
+    left_at, read_at, lapses = history.now, history.seen.stamped_at, history.lapses
 
     def excused() -> bool:
         shut_s = min(history.now - left_at, history.seen.stamped_at - read_at)
-        return (history.mode == OPEN and shut_s < FLICKERS_S) or not history.latched
+        forgot = not history.latched and history.lapses == lapses
+        flickers = history.mode == OPEN and shut_s < FLICKERS_S
+        if flickers or forgot or history.closed_at > left_at:
+            return True
+        sure = history.ours or history.asked_again_at > left_at or lapses + 1 >= LAPSES
+        return not sure and history.now - left_at > LATE_S
 
     return Doubt(text, excused, LATE_S)
 

@@ -8,6 +8,7 @@ from typing import Any, Final, Literal
 
 from bridges.messages import words
 from bridges.messages.heard import Heard
+from bridges.observe.limits import SLOWEST_S
 from workbench.judge import (
     adapter_laws,
     alarm_laws,
@@ -93,6 +94,7 @@ class Judge:
         self.history = SCENES[kind](name)
         self.first: Heard | None = None
         self.broken = False
+        self._heard_at = float("-inf")
         self._volatile_before: bool | None = None
         self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
 
@@ -100,11 +102,13 @@ class Judge:
         """Take the next message of any device, in order of arrival. `own` tells whether the judge
         published the message."""
         self.first = self.first or heard
+        if not own:
+            self._pass_silence(heard.at)
         if self.history.take(heard, own):
             for tally in self._tallies:
                 self._check(tally, heard.at, heard.wall)
             self.history.checked()
-        self._resolve(heard.at)
+        self._resolve()
 
     def alarm_ends(
         self, names: Collection[str], retaining: Collection[str], at: float, wall: float
@@ -134,7 +138,6 @@ class Judge:
         if self.history.states or mute:
             for tally in self._tallies:
                 self._check(tally, at, wall)
-        self._resolve(at)
         return self.verdicts()
 
     def verdicts(self) -> tuple[JudgedLaw, ...]:
@@ -156,14 +159,24 @@ class Judge:
         else:
             tally.kept += 1
 
-    def _resolve(self, now: float) -> None:
+    def _pass_silence(self, now: float) -> None:
+        """Drop every doubt after a silence of the whole network, because the message that would excuse
+        it may be lost."""
+        if now - self._heard_at > SLOWEST_S:
+            for tally in self._tallies:
+                tally.doubt = None
+        self._heard_at = now
+
+    def _resolve(self) -> None:
+        """Decide the doubts that are old enough. Only messages of other nodes show that the network
+        still delivers, so time without them decides nothing."""
         for tally in self._tallies:
             if tally.doubt is None:
                 continue
             doubt, evidence = tally.doubt
             if doubt.excused():
                 tally.doubt = None
-            elif now - evidence.at > doubt.leeway_s:
+            elif self._heard_at - evidence.at > doubt.leeway_s:
                 tally.doubt = None
                 self._breaks(tally, evidence)
 

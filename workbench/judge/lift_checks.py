@@ -5,7 +5,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.observe.lift import HAZARDS
-from workbench.judge.history import NOT_YET
+from workbench.judge.history import FROZEN_S, NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, shown
 from workbench.judge.lift_history import (
     ASKED_S,
@@ -21,6 +21,7 @@ GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5
 REFUSED: Final = 3
 FOREIGN_S: Final = 2.0
+CLOSES_S: Final = 60.0
 SUPERVISED_S: Final = 10.0
 """Time (s) without a request on lift_requests after which no supervisor is assumed. The supervisor may
 be dead, or may be missing in the recording."""
@@ -81,13 +82,17 @@ def own_name(history: LiftHistory) -> Finding:
         return KEPT
     if session in history.elsewhere or history.now - history.since < SETTLED_S:
         return None
+    if not history.recorded:
+        return None
     return Doubt(
         f"held by {shown(session)}, which never asked for it", lambda: session in history.asks
     )
 
 
 def grants(history: LiftHistory) -> Finding:
-    """Check that a lift that is free and in service grants the first request.
+    """Check that a lift that is free and in service grants the first request. MODE_HUMAN is in service:
+    people use the free lift, and the node asks for AGV mode after the grant. An attendant's key shows
+    as OFFLINE.
 
     After a ride, the node may refuse other robots for GRACE_S, because the last robot may still be in
     the car.
@@ -139,7 +144,7 @@ def bypassed(history: LiftHistory) -> Finding:
 def ended_unasked(history: LiftHistory) -> Finding:
     """Check that a session ends only after an END for this session."""
     old, new, since = history.session_before, history.session, history.held_since
-    if history.new is None or history.before is None or not old:
+    if history.new is None or history.before is None or not old or not history.recorded:
         return None
     if old == new:
         hazard = history.new.current_mode in HAZARDS
@@ -246,13 +251,15 @@ def in_agv(history: LiftHistory) -> Finding:
 
 def holds(history: LiftHistory) -> Finding:
     """Check that the door does not close and open again and again while the robot's floor is served."""
-    state = _is_open(history)
-    if state is None or not state.session_id or not history.was_asked_to(state.current_floor):
+    if history.new is None:
         return None
-    if history.often(history.reopened):
+    state, times = _is_open(history), history.closings
+    here = state and state.session_id and history.was_asked_to(state.current_floor)
+    if here and history.often(history.reopened):
         return "the door left OPEN and was OPEN again within 1 s, 3 times during one stop"
-    stays = history.before is not None and history.claims(history.before)
-    return KEPT if stays and history.session == history.session_before else None
+    if here and len(times) == times.maxlen and history.now - times[0] < CLOSES_S:
+        return "the door left OPEN and opened again, 3 times within 60 s, though the robot asked for it"
+    return KEPT if history.stayed else None
 
 
 def floors(history: LiftHistory) -> Finding:
@@ -320,6 +327,8 @@ def grants_nothing(history: LiftHistory) -> Finding:
     new = state.session_id not in ("", before.session_id)
     if before.current_mode not in HAZARDS or _again(history, state):
         return None
+    if new and state.current_mode == d.LiftMode.MODE_OFFLINE and _was_reached(state, before):
+        return None  # the lift may have granted it in a state that was lost
     if not new:
         since = history.seen.mode.since.at
         tested = (
@@ -328,6 +337,13 @@ def grants_nothing(history: LiftHistory) -> Finding:
         )
         return KEPT if not history.session and any(tested) else None
     return f"granted in mode {words.word(d.LiftMode, state.current_mode)}: {words.described(state)}"
+
+
+def _was_reached(state: d.LiftState, before: d.LiftState) -> bool:
+    """Return whether the controller may have answered between the two states. A node that has reached
+    it shows a newer reading. The stamp 0 tells nothing."""
+    read_at = words.stamped_at(state)
+    return read_at == 0.0 or read_at - words.stamped_at(before) > FROZEN_S
 
 
 def no_false(history: LiftHistory) -> Finding:

@@ -127,6 +127,11 @@ class LiftHistory(History[d.LiftState]):
     - `bare_refused`: number of sessions in a row that did not end after an END without a floor, but
       then ended after an END with a floor.
     - `reopened`: times at which the door opened again immediately, during one stop at a floor.
+    - `closings`: times at which the door opened again, after it had left OPEN for no known reason,
+      during one stop at a floor.
+    - `stayed`: whether the latest state ends a stop in which the door was OPEN in two states in a row,
+      and never left OPEN.
+    - `recorded`: whether any request on lift_requests was heard. A recording may lack this topic.
     - `open_seen`: floor and time of the last OPEN at another floor.
     - `direct_at`: when another session last sent a request on lift_requests, for any lift.
     - `rival_at`: when another session last sent a request on lift_requests for this lift, while it was
@@ -164,6 +169,10 @@ class LiftHistory(History[d.LiftState]):
         self.alarmed = self.called_off = False
         self.volatile: bool | None = None
         self.free_since = NOT_YET
+        self.closings: deque[float] = deque(maxlen=3)
+        self.stayed = self.recorded = False
+        self._stop: tuple[str, str] = ("", "")
+        self._stood = self._left = self._explained = False
         self._open: tuple[str, float] = ("", NOT_YET)
         self._shut_at = NOT_YET
 
@@ -204,6 +213,7 @@ class LiftHistory(History[d.LiftState]):
         if not isinstance(message, d.LiftRequest):
             return False
         direct = heard.topic == topics.LIFT_REQUESTS.name
+        self.recorded |= direct
         if message.lift_name != self.name:
             if message.request_type != END and direct:
                 keep(self.elsewhere, message.session_id, self.now)
@@ -232,7 +242,7 @@ class LiftHistory(History[d.LiftState]):
         """Note changes of the session and of the door. Update `offers` and `offered`."""
         if self.before is not None and self.session != self.session_before:
             self._changed_hands(state)
-        if self.session or state.current_mode in HAZARDS:
+        if self.session or state.current_mode in (*HAZARDS, d.LiftMode.MODE_UNKNOWN):
             self.free_since = self.now
         elsewhere = self.before is not None and self.before.current_floor != state.current_floor
         self.travelled |= moves(state) or elsewhere
@@ -242,6 +252,7 @@ class LiftHistory(History[d.LiftState]):
             wanted = (state.destination_floor, *wanted)
         self.offers = bool(opened and self.session and not self.offered)
         self._look_at_door(state, opened)
+        self._look_at_stop(state, opened)
         if self.offers and state.current_floor in wanted:
             self.offered = True
 
@@ -287,6 +298,29 @@ class LiftHistory(History[d.LiftState]):
             self._open = self._open if moves(state) else (state.current_floor, self.now)
         elif at > self._shut_at:
             self._shut_at = self.now
+
+    def _look_at_stop(self, state: d.LiftState, opened: bool) -> None:
+        """Note whether the door stays OPEN at the floor of the session's latest request. A lift may
+        close its door outside AGV mode, after an END, and for a robot that no longer asks."""
+        ask, before = self.asks.get(self.session), self.before
+        stop = (self.session, ask.floor if ask else "")
+        self.stayed = stop != self._stop and self._stood and not self._left
+        if stop != self._stop or before is None:
+            self._stop, self._stood, self._left = stop, False, False
+            self.closings.clear()
+        if ask is None or before is None or state.current_floor != ask.floor:
+            self._explained = True
+            return
+        asked_s = self.now - max(ask.own_at, ask.direct_at)
+        ended = self.ending.at > NOT_YET or asked_s > ASKED_S
+        calm = state.current_mode == d.LiftMode.MODE_AGV and not ended
+        was_open = self.claims(before)
+        if was_open and not opened:
+            self._left, self._explained = True, False
+        if opened and not was_open and self._left and calm and not self._explained:
+            self.closings.append(self.now)
+        self._explained |= not calm
+        self._stood |= opened and was_open
 
     def _end(self, message: d.LiftRequest, direct: bool) -> None:
         if not self.own or self.now - self.last_at > OURS_S:

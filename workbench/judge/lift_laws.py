@@ -44,14 +44,15 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L4.own",
         "session_id is the session_id of a request for this lift",
-        "a session begins",
+        "a session begins, in messages that include lift_requests",
         "A robot enters only if session_id is the robot's own name, fleet/robot",
         REQUEST_LIFT,
         checks.own_name,
     ),
     Law(
         "L4.grants",
-        "A free lift in service shows the session of the robot that asks for it",
+        "A free lift in service (MODE_AGV or MODE_HUMAN) shows the session of the robot that asks"
+        " for it",
         "a request for the free lift, in service",
         "A fleet adapter has no timeout and would wait for ever. A wrong number may be the cause:"
         " AGV_MODE is 1 in a request",
@@ -132,8 +133,10 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     ),
     Law(
         "L7.holds",
-        "The door stays OPEN for the session that called the lift, and does not flap",
-        "two states in a row show the door OPEN at the robot's floor",
+        "The door stays OPEN in AGV mode for a session that asks for its floor, and does not close and"
+        " open again and again",
+        "two states in a row show the door OPEN at the robot's floor, before the robot asks for another"
+        " floor or the session ends",
         "A robot drives off at the first OPEN. It would meet a closing door",
         REQUEST_LIFT,
         checks.holds,

@@ -137,7 +137,7 @@ STORIES: dict[str, tuple[Lines, Lines, Lines]] = {
     "A7.again": (
         [*arrives(), ends(18.5), car(19.0)],
         [*arrives(20.0), ends(18.5), ends(19.5)],
-        [*arrives(30.0), ends(18.5), *alive(30.0)],
+        [*arrives(90.0), ends(18.5), *alive(90.0)],
     ),
     "A7.stops": (
         [*arrives(), ends(18.5), car(19.0)],
@@ -146,8 +146,8 @@ STORIES: dict[str, tuple[Lines, Lines, Lines]] = {
     ),
     "A8.repeats": (
         [*many(0, 30, leaf), opens(5.5)],
-        [*many(0, 12, leaf), *many(5.5, 12, opens)],
-        [*alive(40.0), *many(0, 40, leaf), opens(5.5), opens(20.5, 0), opens(22.5)],
+        [*many(0, 12, leaf), *many(5.5, 12, opens), lists(11.6, RED), leaf(12.0, OPEN)],
+        [*alive(40.0), *many(0, 40, leaf), opens(5.5), opens(20.5, 0), opens(22.5), opens(39.5, 0)],
     ),
     "A8.closes": (
         passes(5.0, closes=False),

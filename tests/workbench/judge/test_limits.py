@@ -34,13 +34,15 @@ Story = Callable[[float], list[Line]]
 
 def is_broken(kind: JudgedKind, law: str, lines: list[Line]) -> bool:
     """Return whether the judge finds the law broken. The judge gets the messages in order of time, and
-    gives its verdict 2 s after the last message."""
+    gives its verdict 2 s after the last message. A fleet is heard then, so the network still
+    delivers."""
     judge = Judge(kind, NAMES[kind])
     lines.sort(key=lambda line: line[0])
     for at, topic, message in lines:
         judge.hear(Heard(at, at, topic.name, message, NODE))
     at = lines[-1][0]
     judge.end(at, at)
+    judge.hear(Heard(at + 2.0, at, topics.FLEET_STATES.name, d.FleetState("other")))
     return law in {j.law.id for j in judge.end(at + 2.0, at) if j.verdict is Verdict.BROKEN}
 
 
@@ -266,7 +268,7 @@ LIFT: list[tuple[str, Story, float, float]] = [
         1.0,
         1.1,
     ),
-    ("L4.own", lambda x: [car(1.0), held(1.0 + x)], 2.9, 3.1),
+    ("L4.own", lambda x: [asks(0.5, BLUE), car(1.0), held(1.0 + x)], 2.9, 3.1),
     ("L4.grants", lambda x: asked_for_long(1.0 + x), 30.0, 30.1),
     ("L4.grants", lambda x: asked_so_often(int(x)), 9, 10),
     ("L4.grants", asked_after_a_ride, 94.8, 95.0),
@@ -487,7 +489,7 @@ DOOR: list[tuple[str, Story, float, float]] = [
         "D2.stays",
         lambda x: [
             *(leaf(0.0), to_door(0.5), leaf(1.0, OPEN), leaf(3.0), leaf(3.0 + x, OPEN)),
-            leaf(5.0, OPEN),
+            *(to_door(3.1), leaf(5.0, OPEN)),
         ],
         0.89,
         0.91,
@@ -496,7 +498,7 @@ DOOR: list[tuple[str, Story, float, float]] = [
         "D2.stays",
         lambda x: [
             *(leaf(0.0), to_door(0.5), leaf(1.0, OPEN), robot_closes(3.0), leaf(5.0, OPEN)),
-            *(leaf(3.0 + x), leaf(9.5)),
+            *(leaf(3.0 + x), to_door(3.1 + x), leaf(9.5)),
         ],
         4.9,
         5.1,
@@ -505,7 +507,7 @@ DOOR: list[tuple[str, Story, float, float]] = [
         "D1.bypass",
         lambda x: [
             *(leaf(0.0), to_door(0.5), leaf(1.0, OPEN), robot_closes(3.0), leaf(5.0, OPEN)),
-            *(leaf(3.0 + x), leaf(9.5)),
+            *(leaf(3.0 + x), to_door(3.1 + x), leaf(9.5)),
         ],
         5.1,
         4.9,

@@ -171,7 +171,11 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
         [*cars(6.0), asks(0.2, BLUE, lift="Lift2"), robot_asks(1.5)],
         [*cars(3.0), asks(0.2, BLUE, lift="Lift2"), robot_asks(1.5), *seconds(3.0, 6.0, held)],
     ),
-    ("lift", "L4.own"): (cars(6.0), rides(), [*cars(4.0), *seconds(4.0, 7.0, held)]),
+    ("lift", "L4.own"): (
+        cars(6.0),
+        rides(),
+        [*cars(4.0), asks(0.5, BLUE), *seconds(4.0, 7.0, held)],
+    ),
     ("lift", "L4.grants"): (cars(6.0), rides(), [*asked_for_long(31.5)]),
     ("lift", "L5.ends"): (
         rides(ends(5.5, floor="L1"), car(6.0)),
@@ -207,7 +211,7 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
     ("lift", "L7.agv"): (rides(), rides(**BOARDS), rides(**BOARDS, mode=HUMAN)),
     ("lift", "L7.holds"): (
         [car(0.0), asks(0.5, floor="L1"), held(1.0, **BOARDS), held(2.0)],
-        [car(0.0), asks(0.5, floor="L1"), held(1.0, **BOARDS), held(2.0, **BOARDS)],
+        rides(asks(0.6, floor="L1"), asks(5.5), held(6.0, to="L3"), **BOARDS),
         [*reopens(3, 8.0, 0.5)],
     ),
     ("lift", "L8.floor"): ([car(0.0, floor="")], [car(0.0)], [car(0.0, floor="L9")]),
@@ -251,11 +255,11 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
     ),
     ("door", "T1.numbers"): ([to_door(0.0)], [leaf(0.0)], [leaf(0.0, 5)]),
     ("door", "D2.opens"): ([*leaves(6.0, OPEN), to_door(2.5)], opens(), [*stays_shut(31.0)]),
-    ("door", "D2.stays"): (opens(), opens(until=16.0), opens(leaf(8.0), leaf(10.0))),
+    ("door", "D2.stays"): (opens(), opens(until=16.0), opens(leaf(8.0), to_door(8.5), leaf(10.0))),
     ("door", "D1.bypass"): (
         opens(),
         opens(robot_closes(5.5)),
-        opens(robot_closes(7.5), leaf(8.0), leaf(10.0)),
+        opens(robot_closes(7.5), leaf(8.0), to_door(8.5), leaf(10.0)),
     ),
     ("door", "D2.holds"): (opens(until=4.0), opens(), [*flaps(3, 8.0, 0.5)]),
     ("door", "D2.people"): (
@@ -290,13 +294,13 @@ STORIES: dict[tuple[JudgedKind, str], tuple[Lines, Lines, Lines]] = {
     ("charger", "C5.robot"): (
         [*bay(6.0), ELSEWHERE],
         served(),
-        [station(0.0, IDLE), ELSEWHERE, station(1.0, ASSIGNED, "r1")],
+        [station(0.0, IDLE), ELSEWHERE, station(1.0, ASSIGNED, "r1"), station(3.0, IDLE)],
     ),
     ("charger", "C5.text"): ([charge(0.0)], bay(1.0), [station(0.0, ERROR, "r1")]),
     ("charger", "C1.keeps"): (
         served(),
         served(RIVAL),
-        served(RIVAL, station(6.0, ASSIGNED, "r2")),
+        [*served(RIVAL), *bay(9.0, ASSIGNED, "r2", 6.0)],
     ),
     ("charger", "C2.start"): (
         served(station(6.0, RELEASED, "r1")),
@@ -396,7 +400,7 @@ def test_a_charge_may_be_taken_over_only_after_its_end() -> None:
     assert verdict("charger", "C1.keeps", served(RIVAL, cancel(5.5), other)) == "kept"
     late = served(RIVAL, station(21.0, ASSIGNED, "r2"), until=21.0)
     assert verdict("charger", "C1.keeps", late) == "kept"
-    taken = served(RIVAL, station(6.0, CHARGING, "r2"), state=CHARGING)
+    taken = [*served(RIVAL, state=CHARGING), *bay(9.0, CHARGING, "r2", 6.0)]
     assert verdict("charger", "C1.keeps", taken) == "broken"
 
 

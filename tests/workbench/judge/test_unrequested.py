@@ -44,6 +44,7 @@ def broken(*said: d.ChargerState | d.ChargerRequest | d.ChargerCancel) -> set[st
         if isinstance(message, d.ChargerState):
             message = replace(message, charger_time=stamp(at))
         judge.hear(Heard(at, at, TOPICS[type(message)], message))
+    judge.hear(Heard(at + 2.0, at, topics.FLEET_STATES.name, d.FleetState("other")))
     return {j.law.id for j in judge.end(at + 2.0, at) if j.verdict is Verdict.BROKEN}
 
 
