@@ -25,7 +25,7 @@ INSIDE = {
     " recorder reset run status",
     "bridges.kinds": "lift door charger lift_supervisor door_supervisor charger_coordinator shared",
     "bridges.transports": "dds ros2 zenoh"
-    " addresses choose cyclone notices peers senders threaded transport",
+    " addresses choose cyclone notices peers repeats senders threaded transport",
     "drivers": "lift door charger profiles"
     " driver_type http_call json_fields numbers on_points tables unsafe",
     "drivers.hal": "can gpio http modbus"

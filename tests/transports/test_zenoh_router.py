@@ -201,6 +201,8 @@ def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_ag
     rmf.subscribe(LIFT_REQUESTS, lambda request: asked.append(request.session_id))
     ended = d.LiftRequest(session_id="a ride that ends")
     wait_until(lambda: asked or peer.sent(requests, ended), "a request is heard")
+    requests.publish(d.LiftRequest(session_id="the last one"))
+    wait_until(lambda: asked[-1] == "the last one", "all requests so far are heard")
     heard = len(asked)
     machine.addresses = frozenset({(2, "10.0.0.8")})
     wait_until(

@@ -91,8 +91,9 @@ class OthersHeard:
     - `spoke`: the time of each fleet adapter's last message (`ObservedGraph.spoke`).
     - `remedies`: the faults' remedies.
     - `reason`: the recorder's reason to keep the file.
-    - `senders`: the nodes that publish each topic on a live graph. For a recording, `senders` is None,
-      because a recording does not name nodes.
+    - `senders`: the nodes that publish each topic on a live graph; None if the nodes are unknown, as in
+      a recording.
+    - `live`: whether a live graph is heard, with every topic. A recording may lack topics.
     """
 
     names: Mapping[Explained, tuple[str, ...]]
@@ -101,6 +102,7 @@ class OthersHeard:
     remedies: Remedies = field(default_factory=dict)
     reason: FileReason | None = None
     senders: Mapping[str, Sequence[str]] | None = None
+    live: bool = False
 
     def nobody_publishes(self, topic: str) -> bool:
         """Return whether it is certain that no node publishes this topic."""

@@ -360,7 +360,7 @@ def _nobody_asks(
 def _idle(found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
     """Explain a closed door that nobody wants open. One of its faults may still need a person."""
     heard = door.asked or door.last_heartbeat or door.unanswered or door.noted
-    if heard is None and around.senders is None:
+    if heard is None and not around.live:
         found.say(
             "No request and no heartbeat was heard, only states. So nobody waits for the door, or these"
             " topics are not recorded.",

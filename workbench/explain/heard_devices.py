@@ -67,18 +67,18 @@ class HeardDevices(ObservedGraph[Device]):
         name: str = "",
         session: str = "",
         most_lines: int = MOST_LINES,
-        graph: Sequence[str] = (),
+        graph: Sequence[str] | None = None,
     ) -> None:
         """Make an empty collection.
 
         - `name`: the name of the devices to explain; "" for all devices.
         - `most_lines`: maximum number of story lines for each device.
-        - `graph`: command-line options that name this graph. Commands that a sentence proposes get
-          these options.
+        - `graph`: command-line options that name this live graph; None for a recording. Commands that
+          a sentence proposes get these options.
         """
         super().__init__()
         self._most_lines = most_lines
-        self._graph = graph
+        self._graph, self._live = graph or (), graph is not None
         self.messages = 0
         self._story_from = float("-inf")
         self._name = name
@@ -293,7 +293,10 @@ class HeardDevices(ObservedGraph[Device]):
         }
         reported = (one.who for one in robots(self.nodes))
         names["robot"] = tuple(dict.fromkeys((*reported, *map(label, self._askers()))))
-        return common.OthersHeard(names, self.messages, spoke, remedies, reason, self.senders)
+        live = self._live or self.senders is not None
+        return common.OthersHeard(
+            names, self.messages, spoke, remedies, reason, self.senders, live=live
+        )
 
     def _answer(self, device: Device, clock: TimePhrases, around: common.OthersHeard) -> Answer:
         match device:

@@ -82,7 +82,7 @@ def _why(
     """Find the cause. Look first for a fault of the lift itself. Then look whether requests reach the
     lift. Then look at the holder of the lift."""
     silent = lift.not_passed_on(clock.now)
-    recorded = lift.supervisor_last is not None or around.senders is not None
+    recorded = lift.supervisor_last is not None or around.live
     if silent is not None and not recorded and (silent.ended or lift.matches(silent)):
         silent = None
     if first_causes.two_nodes(found, lift, clock, around, "lift_states"):
@@ -240,7 +240,7 @@ def _others_wait(
         if one is not claim and one.who != lift.session.value and not lift.is_served(one)
     ]
     texts = [f"{one.who} at {one.wants} {clock.since(one.since)}" for one in others[:4]]
-    any(not_served(found, lift, one) for one in others)
+    next((one for one in others if not_served(found, lift, one)), None)
     if texts:
         more = f", and {len(others) - len(texts)} more" if len(others) > len(texts) else ""
         found.say(

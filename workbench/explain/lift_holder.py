@@ -37,7 +37,7 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
             "listen for longer",
         )
         return
-    if not lift.adapters_heard and around.senders is None and ALARM not in lift.faults(clock.now):
+    if not lift.adapters_heard and not around.live and ALARM not in lift.faults(clock.now):
         nor = " or `lift_requests`" if lift.supervisor_last is None else ""
         found.say(
             f"No request for {lift.name} was heard on `adapter_lift_requests`{nor}, but the recording"

@@ -5,9 +5,10 @@ from typing import Final
 
 from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.observe.requesters import DeviceRequester
+from workbench.explain import answer as common
 from workbench.explain.answer import Answer, OthersHeard
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.phrases import TimePhrases
+from workbench.explain.phrases import TimePhrases, lasted
 
 SETTLES_S: Final = 2.0
 """Normal time (s) from a request until the lift grants the session. After a session has ended, the
@@ -118,7 +119,7 @@ def not_passed_on(
     restart = "restart the lift supervisor (rmf_lift_supervisor, or the one of rmf-bridges)"
     if only_listens(found, lift, clock):
         return
-    recorded = last is not None or around.senders is not None
+    recorded = last is not None or around.live
     reason = _reason(lift, clock)
     if any(one.kind == "lift_supervisor" for one in lift.heard_from(clock.now)):
         reasons = ", ".join(lift.refusals(clock.now, clock.now.at - 5.0))
@@ -143,6 +144,12 @@ def not_passed_on(
     found.because = ()
     if around.nobody_publishes("lift_requests"):
         found.say(f"{says} no node publishes this topic, so the lift supervisor is not running.")
+    elif common.clock_off(claim) and claim.ended is None:
+        where = (
+            f"{nodes} publishes this topic, but" if nodes else "the lift supervisor is not running,"
+        )
+        _perhaps_the_clock(found, claim, f"{says} {where}", restart)
+        return
     elif nodes:
         found.say(f"{says} {nodes} publishes this topic, but hangs, is passive or is cut off.")
         restart = f"look at the log of {nodes}, then {restart}"
@@ -159,3 +166,17 @@ def not_passed_on(
         )
     elif lift.session.value == claim.who:
         found.say(lift.in_car(claim.who, clock.now))
+
+
+def _perhaps_the_clock(found: Answer, claim: DeviceRequester, says: str, restart: str) -> None:
+    """Explain that the supervisor is silent, and that the requester's clock may be the reason. Neither
+    RMF's supervisor nor ours drops repeated requests for their stamps, but another one may."""
+    found.because = ()
+    side = "behind" if claim.stamp_age_s > 0 else "ahead"
+    found.say(
+        f"{says} hangs, is passive or is cut off, or drops the requests, because they are stamped by a"
+        f" clock {lasted(abs(claim.stamp_age_s))} {side} (RMF's supervisor and ours do not).",
+        "a person",
+        f"set the clock of the machine with the fleet adapter of {claim.who} (NTP); if that does not"
+        f" help, look at the supervisor's log, then {restart}",
+    )
