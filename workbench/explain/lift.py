@@ -240,7 +240,9 @@ def _others_wait(
         if one is not claim and one.who != lift.session.value and not lift.is_served(one)
     ]
     texts = [f"{one.who} at {one.wants} {clock.since(one.since)}" for one in others[:4]]
-    next((one for one in others if not_served(found, lift, one)), None)
+    for one in others:
+        if not_served(found, lift, one):
+            break
     if texts:
         more = f", and {len(others) - len(texts)} more" if len(others) > len(texts) else ""
         found.say(
