@@ -67,7 +67,7 @@ class ObservedDevice(ABC, Generic[T]):
         self.first_state: Moment | None = None
         self.last_state: Moment | None = None
         self.gap_s = 0.0
-        self.stamped_at = self.stamp_age_s = self._newest_read = 0.0
+        self.stamped_at = self.stamp_age_s = self._last_read = 0.0
         self.reading = Fact("", began)
         self.changed: dict[str, str] = {}
         self.diagnoses: dict[str, Diagnosis] = {}
@@ -178,9 +178,9 @@ class ObservedDevice(ABC, Generic[T]):
             if self.gap_s > SILENT_S:
                 yield News("states again", moment, gap_s=self.gap_s)
         if stamped_at > 0.0:  # a stamp of 0 says that nothing was read
-            if (back_s := self._newest_read - stamped_at) > 0.0:
+            if (back_s := self._last_read - stamped_at) > 0.0:
                 self._back.append((moment.at, back_s))
-            self._newest_read = stamped_at
+            self._last_read = stamped_at
         self.before, self.state, self.last_state = self.state, state, moment
         self.stamped_at, self.stamp_age_s = stamped_at, moment.wall - stamped_at
         if self.reading.say(reading_age(stamped_at, moment.wall), moment):

@@ -269,8 +269,7 @@ def relays(device: Device, clock: TimePhrases) -> str:
 
     An example is `; its daemon has these relays on: agv_request, call L3`.
     """
-    own = (one for one in device.heard_from(clock.now) if one.kind == device.kind)
-    said = next((one for one in own if "outputs" in one.values), None)
+    said = device.teller("outputs", clock.now)
     changes = [one.since.at for one in device.requesters]
     if device.state is not None:
         changes += [getattr(device, name).since.at for name in device.facts(device.state)]

@@ -37,7 +37,7 @@ FORMS: Final[Sequence[tuple[str, Who, str]]] = (
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class AskedCharge:
     """The last request for a charger for one robot, or its refusal. `do`: what a person should do after
     the refusal."""
 
@@ -55,7 +55,7 @@ class ChargerWishes:
     """
 
     def __init__(self) -> None:
-        self.last: dict[str, Wish] = {}
+        self.last: dict[str, AskedCharge] = {}
         self.members: dict[str, None] = {}
 
     def hear(self, message: d.Message, moment: Moment) -> None:
@@ -67,7 +67,9 @@ class ChargerWishes:
             case d.ChargerRequest():
                 who, bay = f"{message.fleet_name}/{message.robot_name}", message.charger_name
                 text = f"{f'Charger {label(bay)}' if bay else 'A charger'} was requested for"
-                _keep(self.last, who, Wish(f"{text} {label(who)}", moment, message.request_id))
+                _keep(
+                    self.last, who, AskedCharge(f"{text} {label(who)}", moment, message.request_id)
+                )
             case d.ChargerState() if self.last:
                 self.last.pop(label(f"{message.robot_fleet}/{message.robot_name}"), None)
             case d.ChargerCancel():
@@ -78,7 +80,7 @@ class ChargerWishes:
                 do = "compare the request with the settings: the refusal says what differs"
                 if told.reason == refusals.OCCUPIED:
                     do = "request the charger again when it is free"
-                _keep(self.last, told.robot, Wish(text, moment, told.request_id, do))
+                _keep(self.last, told.robot, AskedCharge(text, moment, told.request_id, do))
 
     def told(
         self, who: str, coordinator: Diagnosis | None, clock: TimePhrases, *, ours: bool

@@ -162,8 +162,13 @@ class Device(ObservedDevice[Any]):
     def told(self, key: str, now: Moment) -> str:
         """Return the present value of this key from the device's own daemon. Return "" if the value is
         unknown."""
+        said = self.teller(key, now)
+        return said.values[key] if said else ""
+
+    def teller(self, key: str, now: Moment) -> Diagnosis | None:
+        """Return the present diagnostics of the device's own daemon that have this key."""
         own = (one for one in self.heard_from(now) if one.kind == self.kind)
-        return next((one.values[key] for one in own if key in one.values), "")
+        return next((one for one in own if key in one.values), None)
 
     def faults(self, now: Moment) -> dict[str, tuple[str, Moment]]:
         """Return fault code -> the fault's detail and beginning. The faults from the device's own
@@ -180,13 +185,14 @@ class Device(ObservedDevice[Any]):
         said = ((one.kind, one.values.get("waits")) for one in self.heard_from(now))
         return {kind: label(text, 200) for kind, text in said if text}
 
-    def refusals(self, now: Moment, since: float) -> list[str]:
-        """Return the reasons of refusals since time `since` (s). The latest reason comes first."""
+    def refusals(self, now: Moment, since: float, kind: str = "") -> list[str]:
+        """Return the reasons of refusals since time `since` (s). The latest reason comes first. `kind`:
+        the kind of the daemon that refuses; "" for any kind."""
         found = [
             (last.at, reason)
             for one in self.heard_from(now)
             for reason, (_, last) in one.refused.items()
-            if last.seen and last.at >= since
+            if last.seen and last.at >= since and kind in ("", one.kind)
         ]
         return [reason for _, reason in sorted(found, reverse=True)]
 

@@ -9,7 +9,6 @@ supervisor must list the robot for this door. RMF's DoorClose waits until no hea
 from shlex import quote
 from typing import Final
 
-from bridges.observe.diagnosis import Diagnosis
 from bridges.observe.door import CLOSED, OPEN, SUPERVISOR
 from bridges.observe.limits import FLAPS, REQUESTER_SILENT_S, SILENT_S
 from bridges.observe.requesters import DeviceRequester, Moment
@@ -19,7 +18,6 @@ from workbench.explain.answer import Answer
 from workbench.explain.door_facts import DoorFacts
 from workbench.explain.explanation import CheckedField
 from workbench.explain.phrases import TimePhrases, lasted, listed
-from workbench.explain.rows import label
 
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
@@ -193,7 +191,7 @@ def _stays_shut(found: Answer, door: DoorFacts, clock: TimePhrases, asked: str) 
     if on == common.RELAYS_OFF and new:
         found.acts("the device's node", f"open {door.name}: the request came a moment ago")
     elif on == common.RELAYS_OFF:
-        reasons = _refused(door.own(clock.now), clock.now.at - 10.0)
+        reasons = ", ".join(door.refusals(clock.now, clock.now.at - 10.0, door.kind))
         deaf = "" if door.has_order(clock.now) else "hear the request, or does not "
         does = f"refuses the request: {reasons}" if reasons else f"does not {deaf}obey it"
         found.say(
@@ -237,18 +235,13 @@ def _stamped_before_its_open(found: Answer, door: DoorFacts, claim: DeviceReques
     return True
 
 
-def _refused(said: Diagnosis | None, since: float) -> str:
-    """List the reasons why our daemon has refused requests since time `since` (s)."""
-    refused = said.refused.items() if said else ()
-    return ", ".join(label(why) for why, (_, at) in refused if at.seen and at.at >= since)
-
-
 def _not_taken(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     """Explain why the supervisor does not list a requester that asks for OPEN, or still lists a
     requester that asks for CLOSE."""
     who, now, ours = claim.who, clock.now, door.supervisor(clock.now)
     opens = claim.wants == OPEN
-    reasons, last = _refused(ours, claim.since.at), door.last_heartbeat
+    reasons = ", ".join(door.refusals(now, claim.since.at, SUPERVISOR))
+    last = door.last_heartbeat
     answers_s = SILENT_S if last is not None and last.at < claim.since.at else SETTLES_S
     if not opens:
         found.say(f"{who} asks for CLOSE, but the last heartbeat still lists {who}.")

@@ -67,11 +67,12 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
 Each code has two texts: an explanation, and what a person should check. "" stands for the text in
 `bridges/runtime/faults.yaml`.
 """
-IF_SO: Final[Mapping[str, tuple[str, str]]] = {
+TEXTS: Final[Mapping[str, tuple[str, str]]] = {
+    **OWN,
     "AGV_MODE_LOST": ("Until its next try the daemon asks the controller for nothing.", ""),
-    **dict.fromkeys(("FIRE_ALARM", "MANUAL", "OUT_OF_SERVICE", "OVERLOAD"), ("", "")),
 }
-"""Faults that explain a device only in some states, with texts as in `OWN`."""
+"""The texts of `OWN`, and of other faults that explain a device only in some states. A fault without
+texts has those of `bridges/runtime/faults.yaml`."""
 HARMLESS: Final = ("nothing", "wait", "intended")
 """The beginnings of the remedies that ask nobody to act at once."""
 READINGS: Final = ("INPUTS_NOT_FRESH", "COMMUNICATION_LOST")
@@ -165,17 +166,20 @@ def own_fault(
     if code is None:
         return False
     cause, do = around.remedies.get(code, (f"its daemon reports {code}", f"mend {code}"))
-    why, look = {**OWN, **IF_SO}.get(code, ("", ""))
+    why, look = TEXTS.get(code, ("", ""))
     names = {"end": end, "contact": {"open": "'opened'", "shut": "'closed'"}[end]}
-    detail = f": {present[code].rstrip('.?')}" if present[code] else ""
     found.because = ()
     found.say(
-        f"{device.name} has a fault of its own, {code}{detail}."
+        f"{device.name} has a fault of its own, {_named(code, present[code])}."
         f" {why.format(**names) or f'The likely cause: {cause}.'}",
         "a person",
         look.format(**names) or do,
     )
     return True
+
+
+def _named(code: str, detail: str) -> str:
+    return f"{code}: {detail.rstrip('.?')}" if detail else code
 
 
 def needs_a_person(found: Answer, device: Device, clock: TimePhrases, around: OthersHeard) -> bool:
@@ -186,8 +190,7 @@ def needs_a_person(found: Answer, device: Device, clock: TimePhrases, around: Ot
         cause, do = around.remedies.get(code, ("", "nothing"))
         if not do.startswith(HARMLESS):
             found.because = tuple(other for other in faults if other != code)
-            what = f"{code}: {detail.rstrip('.?')}" if detail else code
-            text = f"But {device.name} has a fault, {what}. The likely cause: {cause}."
-            found.say(text, "a person", do)
+            what = f"But {device.name} has a fault, {_named(code, detail)}."
+            found.say(f"{what} The likely cause: {cause}.", "a person", do)
             return True
     return False

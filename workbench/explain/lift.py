@@ -15,7 +15,13 @@ from workbench.explain import first_causes, lift_holder
 from workbench.explain.answer import Answer
 from workbench.explain.explanation import CheckedField
 from workbench.explain.lift_facts import LiftFacts
-from workbench.explain.lift_ungranted import SETTLES_S, not_granted, not_passed_on, not_served
+from workbench.explain.lift_ungranted import (
+    SETTLES_S,
+    is_recorded,
+    not_granted,
+    not_passed_on,
+    not_served,
+)
 from workbench.explain.phrases import TimePhrases, listed
 from workbench.explain.rows import label
 
@@ -82,7 +88,7 @@ def _why(
     """Find the cause. Look first for a fault of the lift itself. Then look whether requests reach the
     lift. Then look at the holder of the lift."""
     silent = lift.not_passed_on(clock.now)
-    recorded = lift.supervisor_last is not None or around.live
+    recorded = is_recorded(lift, around)
     if silent is not None and not recorded and (silent.ended or lift.matches(silent)):
         silent = None
     if first_causes.two_nodes(found, lift, clock, around, "lift_states"):

@@ -14,7 +14,7 @@ from workbench.explain.lift_ungranted import SETTLES_S
 from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
-ALARM: Final = "HOLDER_SILENT"
+SILENT: Final = "HOLDER_SILENT"
 """The fault of our supervisor that hears no request of the holder."""
 LONG_S: Final = 60.0
 """Maximum normal time (s) from the moment at which all conditions are met until the robot drives
@@ -37,7 +37,7 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
             "listen for longer",
         )
         return
-    if not lift.adapters_heard and not around.live and ALARM not in lift.faults(clock.now):
+    if not lift.adapters_heard and not around.live and SILENT not in lift.faults(clock.now):
         nor = " or `lift_requests`" if lift.supervisor_last is None else ""
         found.say(
             f"No request for {lift.name} was heard on `adapter_lift_requests`{nor}, but the recording"

@@ -67,6 +67,11 @@ def not_served(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> bool:
     return True
 
 
+def is_recorded(lift: LiftFacts, around: OthersHeard) -> bool:
+    """Return whether a message on `lift_requests` would have been heard."""
+    return lift.supervisor_last is not None or around.live
+
+
 def only_listens(found: Answer, lift: LiftFacts, clock: TimePhrases) -> bool:
     """Check whether our supervisor has just started. If so, explain this and return True."""
     if _reason(lift, clock) != LISTENS:
@@ -119,7 +124,7 @@ def not_passed_on(
     restart = "restart the lift supervisor (rmf_lift_supervisor, or the one of rmf-bridges)"
     if only_listens(found, lift, clock):
         return
-    recorded = last is not None or around.live
+    recorded = is_recorded(lift, around)
     reason = _reason(lift, clock)
     if any(one.kind == "lift_supervisor" for one in lift.heard_from(clock.now)):
         reasons = ", ".join(lift.refusals(clock.now, clock.now.at - 5.0))

@@ -86,8 +86,8 @@ class DdsPeers:
         return {key.bytes for key in self._peers.present() if isinstance(key, uuid.UUID)}
 
     def _take_one(self, reader: BuiltinReader, publishes: bool) -> bool:
-        """Take one announcement. Return False without an announcement, and after one that cannot be
-        read. DDS would give none of several announcements if it could not read one of them."""
+        """Take one announcement. Return whether there was one that could be read. Of several
+        announcements at once, DDS would give none if it could not read one of them."""
         try:
             samples = reader.take(1)
             for sample in samples:

@@ -307,5 +307,5 @@ class ZenohSubscription(ZenohEnd):
             return None
         self._senders.key = sender
         message = cdr.decode(self.topic.type, bytes(sample.payload), self._release)
-        sent_at = sample.timestamp and str(sample.timestamp)
-        return None if self._repeats.has(attached or sent_at, message) else message
+        sent = attached or (sample.timestamp and str(sample.timestamp))
+        return None if self._repeats.has(sent, message) else message

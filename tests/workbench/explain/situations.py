@@ -319,9 +319,7 @@ def door_does_not_open() -> Case:
     """The daemon holds the door open, but the door stays shut."""
     scene = Scene("ward")
     scene.fail("ward", "operator", "stuck")
-    scene.robot("fleet/red").opens("ward")
-    scene.run(30.0)
-    return scene.heard, "door", "ward"
+    return _waits_for_door(scene, "ward")
 
 
 def door_in_a_fire() -> Case:
@@ -329,9 +327,7 @@ def door_in_a_fire() -> Case:
     scene = Scene("lab")
     scene.press("lab", "fire", True)
     scene.run(2.0)
-    scene.robot("fleet/red").opens("lab")
-    scene.run(30.0)
-    return scene.heard, "door", "lab"
+    return _waits_for_door(scene, "lab")
 
 
 def door_held_open_in_a_fire() -> Case:
@@ -346,9 +342,13 @@ def door_whose_position_is_unknown() -> Case:
     """A door's controller shows a number that its map does not list, and the door does not open."""
     scene = Scene("icu")
     scene.fail("icu", "closed", "wrong")
-    scene.robot("fleet/red").opens("icu")
+    return _waits_for_door(scene, "icu")
+
+
+def _waits_for_door(scene: Scene, door: str) -> Case:
+    scene.robot("fleet/red").opens(door)
     scene.run(30.0)
-    return scene.heard, "door", "icu"
+    return scene.heard, "door", door
 
 
 def door_without_supervisor() -> Case:
