@@ -21,7 +21,7 @@ SMALL = """() => [...document.querySelectorAll('a, button, input, summary')].fil
 AT_END = """() => { const one = document.querySelector('.timeline');
   const right = one.scrollLeft + one.clientWidth;
   return one.scrollWidth > one.clientWidth && right >= one.scrollWidth - 1; }"""
-ON_SCREEN = """told => [...document.querySelectorAll('#wrong p, #why p')].some(one => {
+ON_SCREEN = """told => [...document.querySelectorAll('#wrong p, #why p, #why li')].some(one => {
   const box = one.getBoundingClientRect();
   return one.textContent.includes(told) && box.left >= 0 && box.right <= innerWidth
     && box.bottom <= innerHeight && document.documentElement.scrollWidth <= innerWidth; })"""
