@@ -48,12 +48,13 @@ next poll."""
 
 @dataclass(frozen=True)
 class Size:
-    """The names of a site's devices and robots."""
+    """The names of a site's devices and robots, and `stale_after_s` of its lifts and doors."""
 
     lifts: tuple[str, ...] = LIFTS
     doors: tuple[str, ...] = DOORS
     chargers: tuple[str, ...] = CHARGERS
     robots: tuple[str, ...] = ROBOTS
+    stale_after_s: float = 1.0
 
 
 SITE = Size()
@@ -61,12 +62,14 @@ SITE = Size()
 
 def hospital(lifts: int, doors: int, chargers: int, robots: int) -> Size:
     """Return a site with these numbers of devices and robots. After five doors, names, wirings and
-    drivers repeat in the same order."""
+    drivers repeat in the same order. A state is published each second; with this `stale_after_s` the
+    simulated daemons need no scan between two of them."""
     return Size(
         tuple(f"Lift{number}" for number in range(1, lifts + 1)),
         _numbered(DOORS, doors),
         tuple(f"bay{number}" for number in range(1, chargers + 1)),
         _numbered(ROBOTS, robots),
+        stale_after_s=1.12,
     )
 
 
@@ -94,21 +97,23 @@ class Device:
 
 def devices(timeline: Timeline, size: Size = SITE) -> dict[str, Device]:
     """Return every lift, door and charger of the site by name."""
-    found = [_numbered_lift(timeline, name, number) for number, name in enumerate(size.lifts)]
-    found += [_door(timeline, name, number) for number, name in enumerate(size.doors)]
+    stale = size.stale_after_s
+    found = [_numbered_lift(timeline, name, n, stale) for n, name in enumerate(size.lifts)]
+    found += [_door(timeline, name, number, stale) for number, name in enumerate(size.doors)]
     for number, name in enumerate(size.chargers):
         found.append(_charger(timeline, name, clear_errors_per_h=60 if number % 3 == 0 else 0))
     return {device.name: device for device in found}
 
 
-def _door(timeline: Timeline, name: str, number: int) -> Device:
+def _door(timeline: Timeline, name: str, number: int, stale_after_s: float) -> Device:
     dry, shipped = _dry_doors(), ("ward_door", "lab_door")
     number %= len(DOORS)
     if number >= len(dry):
-        settings = _shipped("door_register", shipped[number - len(dry)])
+        settings = _limited(_shipped("door_register", shipped[number - len(dry)]), stale_after_s)
         return _register_door(timeline, name, settings)
     content, bus = dry[number]
-    return _dry_door(timeline, name, _convert(door_dry_contact, content), bus)
+    settings = _limited(_convert(door_dry_contact, content), stale_after_s)
+    return _dry_door(timeline, name, settings, bus)
 
 
 def _wired(
@@ -135,10 +140,18 @@ def _wired(
     )
 
 
-def _numbered_lift(timeline: Timeline, name: str, number: int) -> Device:
+def _numbered_lift(timeline: Timeline, name: str, number: int, stale_after_s: float) -> Device:
     if number % 2 == 0:
-        return _lift(timeline, name, _shipped("lift_dry_contact", "Lift1"), "gpio")
-    return _lift(timeline, name, _convert(lift_dry_contact, _lift2()), "modbus")
+        settings, bus = _shipped("lift_dry_contact", "Lift1"), "gpio"
+    else:
+        settings, bus = _convert(lift_dry_contact, _lift2()), "modbus"
+    return _lift(timeline, name, _limited(settings, stale_after_s), bus)
+
+
+def _limited(settings: Any, stale_after_s: float) -> Any:
+    """Return the settings with this time after which the device is OFFLINE."""
+    limits = msgspec.structs.replace(settings.limits, stale_after_s=stale_after_s)
+    return msgspec.structs.replace(settings, limits=limits)
 
 
 def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:

@@ -1,7 +1,8 @@
 """The daemons of the site: a node for each device, and the supervisors. Each can die and start again.
 
-A daemon scans its device at each request, at its core's `wake_at`, and every SCAN_S. A change of a
-contact also causes a scan. On a bus with polling this scan comes one poll period later.
+A daemon scans its device at each request, at its core's `wake_at`, and SCANS_BEFORE_S before the last
+reading would be stale. A change of a contact also causes a scan. On a bus with polling this scan comes
+one poll period later.
 
 Between these times no input changes and no time limit passes, so a scan would repeat the last decision.
 Therefore a daemon here need not scan 20 times per second, as the real loop does. The tests of the cores
@@ -33,9 +34,11 @@ from tests.site.network import Air, Place
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
-SCAN_S = 0.9
-"""The time between scans (s). It is less than the permitted age of a state (1 s). The core's `wake_at`
-also makes the daemon publish one state per second."""
+SCANS_BEFORE_S = 0.1
+"""The time (s) from a daemon's scan to the time at which its last reading would be stale. The core's
+`wake_at` also makes the daemon publish one state per second."""
+STALE_S = 1.0
+"""The time (s) after which a reading of a kind without `stale_after` counts as stale."""
 LEAST_GAP_S = 0.001
 
 
@@ -69,6 +72,7 @@ class DeviceDaemon:
             None
         )
         self._changed = False
+        self._scan_s = (device.settings.stale_after() or STALE_S) - SCANS_BEFORE_S
         device.plant.on_edge = self._edge
         self._timeline = timeline
         self._air = air
@@ -135,7 +139,7 @@ class DeviceDaemon:
         self.scans += 1
         self.scanned(self)
         changes_at = (now if self._changed else self.device.plant.next_at()) + self.device.poll_s
-        due = min(self._node.wake_at, changes_at, now + SCAN_S)
+        due = min(self._node.wake_at, changes_at, now + self._scan_s)
         self._alarm.set(max(due, now + LEAST_GAP_S))
 
     def advance(self) -> None:
