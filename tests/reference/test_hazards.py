@@ -31,8 +31,9 @@ ORDERS = {
     "coordinator.request",
     "coordinator.cancel",
     "coordinator.assignment",
+    "alarm.fleets",
 }
-"""The messages by which a supervisor or the coordinator orders a device or robot."""
+"""The messages by which a supervisor, the coordinator or an alarm orders a device or robots."""
 
 
 def test_every_output_of_every_kind_and_every_order_has_its_four_rows() -> None:

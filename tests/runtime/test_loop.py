@@ -45,6 +45,20 @@ def test_a_round_ends_after_the_device_under_way_when_the_loop_is_told_to_end() 
     assert corridor.round(0.0) == ["ward claimed", "ward read"]
 
 
+def test_each_round_feeds_the_buss_dead_man_and_a_round_that_does_not_end_feeds_nothing() -> None:
+    """Without this, GPIO has no dead-man, and a module's watchdog trips in the midst of a ride."""
+    corridor, seen = Corridor(), list[int]()
+    for door in corridor.doors.values():
+        door.during = lambda: seen.append(corridor.bus.fed)
+    corridor.round(0.0)
+    corridor.round(0.1)
+    corridor.round(SCAN_S)
+    assert (seen, corridor.bus.fed) == ([0, 0, 2, 2], 3)
+    corridor.doors["ward"].during = corridor.loop.inbox.close
+    corridor.round(2 * SCAN_S)
+    assert corridor.bus.fed == 3
+
+
 def test_at_the_end_every_output_is_switched_off_before_anything_is_let_go() -> None:
     corridor = Corridor()
     assert corridor.loop.end()

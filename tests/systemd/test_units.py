@@ -110,6 +110,18 @@ def test_the_unit_without_a_drop_in_permits_no_device() -> None:
     assert "Environment=RMF_BRIDGE_SERVICE=1 RMF_BRIDGE_FITS=nothing PYTHONUNBUFFERED=1" in lines
 
 
+def test_services_of_one_user_do_not_read_what_the_others_keep() -> None:
+    users, kept, hidden = dict[Path, str](), dict[Path, str](), dict[Path, str]()
+    for unit in (PAGE, EXPORTER, NOTIFY):
+        settings = dict(re.findall(r"^(\w+)=(.*)$", unit.read_text(), re.M))
+        users[unit] = settings["User"]
+        kept[unit] = settings.get("StateDirectory", "")
+        hidden[unit] = settings["InaccessiblePaths"]
+    for unit in users:
+        others = {kept[one] for one in users if users[one] == users[unit] and one != unit} - {""}
+        assert set(hidden[unit].split()) == {f"-%S/{each}" for each in others}
+
+
 def test_the_command_at_boot_may_end_a_child_that_has_become_a_services_user() -> None:
     (line,) = re.findall(r"^CapabilityBoundingSet=(.*)$", EARLY.read_text(), re.M)
     assert line.split() == ["CAP_CHOWN", "CAP_KILL", "CAP_SETGID", "CAP_SETUID"]

@@ -13,7 +13,14 @@ import pytest
 
 from bridges.kinds.shared.rmf_section import Zenoh, ZenohTls
 from bridges.messages import definitions as d
-from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES, AnyTopic
+from bridges.messages.releases import NEWEST
+from bridges.messages.topics import (
+    DOOR_REQUESTS,
+    EMERGENCY_SIGNAL,
+    LIFT_REQUESTS,
+    LIFT_STATES,
+    AnyTopic,
+)
 from bridges.transports.transport import Subscription
 from bridges.transports.zenoh.transport import ZenohTransport
 from tests.transports.zenoh_programs import Router, free_port
@@ -77,7 +84,17 @@ def node(router: Router, papers: Path, name: str, own: bool = True) -> ZenohTran
         private_key=str(papers / f"{name}.key") if own else None,
     )
     settings = Zenoh(connect=(router.endpoint,), mode="client", tls=tls)
-    return ZenohTransport(name, DOMAIN, loopback=False, settings=settings)
+    return ZenohTransport(name, DOMAIN, loopback=False, settings=settings, release=NEWEST)
+
+
+def speaker(message: Any) -> str:
+    """Return the name of the node that has sent this message of the next test."""
+    match message:
+        case d.EmergencySignal(fleet_names=(name, *_)):
+            return str(name)
+        case d.DoorRequest(requester_id=name):
+            return str(name)
+    return str(message.session_id)
 
 
 def test_only_rmf_may_ask_and_only_the_lift_may_answer(
@@ -87,29 +104,26 @@ def test_only_rmf_may_ask_and_only_the_lift_may_answer(
 
     def listen(listener: str, topic: AnyTopic) -> Subscription:
         def note(message: Any) -> None:
-            if message.session_id != listener:  # a node hears its own messages without the router
-                heard.add((listener, message.session_id, topic.name))
+            if speaker(message) != listener:  # a node hears its own messages without the router
+                heard.add((listener, speaker(message), topic.name))
 
         return nodes[listener].subscribe(topic, note)
 
-    topics: dict[AnyTopic, Callable[..., Any]] = {
-        LIFT_REQUESTS: d.LiftRequest,
-        LIFT_STATES: d.LiftState,
+    topics: dict[AnyTopic, Callable[[str], Any]] = {
+        LIFT_REQUESTS: lambda name: d.LiftRequest("Lift1", session_id=name),
+        DOOR_REQUESTS: lambda name: d.DoorRequest(requester_id=name, door_name="ward"),
+        LIFT_STATES: lambda name: d.LiftState(lift_name="Lift1", session_id=name),
+        EMERGENCY_SIGNAL: lambda name: d.EmergencySignal((name,)),
     }
     ears = [listen(name, topic) for name in nodes for topic in topics]
     mouths = [
-        (nodes[name].publisher(topic), made(lift_name="Lift1", session_id=name))
+        (nodes[name].publisher(topic), made(name))
         for name in ("viewer", "lift", "rmf")  # the nodes without permission publish first
         for topic, made in topics.items()
     ]
-    wanted = {
-        ("lift", "rmf", "lift_requests"),
-        ("viewer", "rmf", "lift_requests"),
-        ("rmf", "lift", "lift_states"),
-        ("viewer", "lift", "lift_states"),
-        ("lift", "rmf", "lift_states"),
-        ("viewer", "rmf", "lift_states"),
-    }
+    requests, answers = ("lift_requests", "door_requests"), ("lift_states", "emergency_signal")
+    wanted = {(ear, "rmf", topic) for ear in ("lift", "viewer") for topic in (*requests, *answers)}
+    wanted |= {(ear, "lift", topic) for ear in ("rmf", "viewer") for topic in answers}
 
     def all_speak() -> bool:
         for publisher, message in mouths:
@@ -120,7 +134,7 @@ def test_only_rmf_may_ask_and_only_the_lift_may_answer(
     for _ in range(3):
         all_speak()
     assert heard == wanted
-    assert len(ears) == 6
+    assert len(ears) == len(nodes) * len(topics)
 
 
 def test_a_viewer_announces_no_publisher_so_it_makes_no_supervisor_passive(
