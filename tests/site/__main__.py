@@ -12,10 +12,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tests.site.building import SITE, hospital
-from tests.site.day import HOUR_S, SUPERVISORS, Site
+from tests.site.day import SUPERVISORS, Site
 from tests.site.growth import growth
 from tests.site.laws import Broken
 from tests.site.saved import OtherCode, load, save
+from tests.site.timeline import HOUR_S
 
 SHIFT_H = 2.0
 

@@ -64,12 +64,11 @@ class Charge:
             if assignment.robot_name == self.robot:
                 self.dedicated = assignment.waypoint_name
 
-    def state(self) -> d.FleetState:
-        """Return the state of the fleet. This adapter knows only its own robot."""
+    def state(self) -> d.RobotState:
+        """Return the state of the robot."""
         modes = d.RobotModeValue
         at = self._waypoints.get(self.place)
         away = d.Location(x=-1000.0, y=-1000.0, level_name="L1")
         where = d.Location(x=at.x, y=at.y, level_name=at.level) if at else away
         mode = d.RobotMode(int(modes.MODE_CHARGING if self.task_id else modes.MODE_MOVING))
-        robot = d.RobotState(self.robot, "model", self.task_id, 0, mode, self.battery, where)
-        return d.FleetState(FLEET, (robot,))
+        return d.RobotState(self.robot, "model", self.task_id, 0, mode, self.battery, where)

@@ -10,7 +10,9 @@ from random import Random
 from bridges.kinds.charger_coordinator import KIND as COORDINATOR
 from bridges.kinds.door_supervisor import KIND as DOOR_SUPERVISOR
 from bridges.kinds.lift_supervisor import KIND as LIFT_SUPERVISOR
+from bridges.messages import definitions as d
 from bridges.messages.releases import JAZZY, KILTED
+from bridges.messages.topics import FLEET_STATES
 from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import FAILS, LiftPlant
@@ -30,7 +32,7 @@ from tests.site.laws import BOUND_S, Broken, Laws
 from tests.site.network import CLEAR, Air, Place, Weather
 from tests.site.robots import Places, Resident
 from tests.site.storeroom import Storeroom
-from tests.site.timeline import NEVER, Timeline
+from tests.site.timeline import HOUR_S, NEVER, Alarm, Timeline
 from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable, pressable
 
 WIND_DOWN_S = BOUND_S + 90.0
@@ -47,10 +49,11 @@ SWEEP_S = 45.0
 """The time (s) before the end of the day at which RMF's supervisors restart. By then every robot has
 ended its tour."""
 LOOK_EVERY_S = 5.0
-LAG_S = 0.05
-"""The time (s) between the rounds of a supervisor in a hospital, whose machine is busy. In 0.05 s it
-gets ten messages."""
-HOUR_S = 3600.0
+LAG_S = 0.1
+"""The time (s) between the rounds of a supervisor in a hospital, whose machine is busy. In 0.1 s it
+gets twenty messages."""
+JUDGED_S = 900.0
+"""How long (s) the judges listen in each hour of a hospital."""
 
 
 SUPERVISORS = ("ours", "kilted", "jazzy")
@@ -82,7 +85,7 @@ class Site:
         self.timeline = timeline = Timeline()
         self.ills = Ills(timeline)
         self.air = Air(timeline, Random(self.random.random()))
-        self.laws = Laws(timeline, self.ills)
+        self.laws = Laws(timeline, self.ills, HOUR_S if size is SITE else JUDGED_S)
         self.air.watch = self.laws.heard
         self.air.sorts = size is not SITE
         self.devices = devices(timeline, size)
@@ -102,6 +105,7 @@ class Site:
         self.coordinated = seed // len(SUPERVISORS) % 2 == 0
         self.nodes = [*self.supervisors, *([self.coordinator] if self.coordinated else [])]
         self.robots = [self._robot(f"fleet/{name}") for name in size.robots]
+        self._fleet = Alarm(timeline, self._tell_fleet)
         self.trouble = Trouble(
             timeline, self.ills, Random(self.random.random()), self._draw, self.laws.note
         )
@@ -178,6 +182,17 @@ class Site:
         for party in parties:
             self.timeline.after(self.random.uniform(2.0, 6.0), party.start)
         self.timeline.after(LOOK_EVERY_S, self._watch)
+        if self.size is not SITE and self.coordinated:
+            self._fleet_place = Place(self.air, "fleet", lambda: None)
+            self._fleet_states = self._fleet_place.publisher(FLEET_STATES)
+            self._tell_fleet()
+
+    def _tell_fleet(self) -> None:
+        """Publish the state of a hospital's fleet each second: of each robot whose adapter lives."""
+        robots = (robot.reported() for robot in self.robots if robot.alive)
+        known = tuple(one for one in robots if one is not None)
+        self._fleet_states.publish(d.FleetState(charging.FLEET, known))
+        self._fleet.set(self.timeline.now + 1.0)
 
     def _next_shift(self) -> None:
         """Let the robots leave their homes again, with the weather of a new day."""
@@ -260,10 +275,11 @@ class Site:
 
     def crossed(self, robot: Resident) -> None:
         self.laws.crossed(robot.name)
+        doorways = {robot.doorway for robot in self.robots}
         for door in self.size.doors:
             if self.devices[door].plant.contact("obstruction") and self._people.random() < 0.2:
                 self._follows(door)  # a person walks in behind the robot
-            self._obstruct(door)
+            self._obstruct(door, there=door in doorways)
 
     def _follows(self, door: str) -> None:
         self._people_at[door] = self.timeline.now + self._people.uniform(1.0, 8.0)
@@ -296,9 +312,11 @@ class Site:
         assert isinstance(plant, ChargerPlant)
         return plant.battery >= 1.0
 
-    def _obstruct(self, door: str) -> None:
-        """Set the light curtain. It sees robots, people and obstructions in the doorway."""
-        there = any(robot.doorway == door for robot in self.robots)
+    def _obstruct(self, door: str, there: bool | None = None) -> None:
+        """Set the light curtain. It sees robots, people and obstructions in the doorway. `there` tells
+        whether a robot is in the doorway; None if the caller does not know."""
+        if there is None:
+            there = any(robot.doorway == door for robot in self.robots)
         there = there or self.ills.has(door, "press obstruction")
         there = there or self.timeline.now < self._people_at.get(door, 0.0)
         if there != self.devices[door].plant.contact("obstruction"):
@@ -320,7 +338,15 @@ class Site:
         own = Random(self.random.random())
         charge = charging.Charge(name.split("/")[1], self.charging) if self.coordinated else None
         return Resident(
-            self.timeline, self._join, self, name, own, places, jazzy=self.jazzy, charge=charge
+            self.timeline,
+            self._join,
+            self,
+            name,
+            own,
+            places,
+            jazzy=self.jazzy,
+            charge=charge,
+            tells=size is SITE,
         )
 
     def _join(self, name: str) -> Place:

@@ -25,7 +25,7 @@ from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import LiftPlant
 from hal_fakes.plants.plant import Edge
 from tests.site.daemons import DeviceDaemon
-from tests.site.timeline import EPOCH, NEVER, Timeline
+from tests.site.timeline import EPOCH, HOUR_S, NEVER, Timeline
 from tests.site.trouble import Ills
 from workbench.judge.judge import LAWS, Judge, JudgedKind
 from workbench.judge.law import Verdict
@@ -122,13 +122,15 @@ class Judges:
 
 
 class Laws:
-    """All laws of the site. `log` keeps the latest events, to report a failure."""
+    """All laws of the site. `log` keeps the latest events, to report a failure. `judged_s`: for how
+    long the judges of the devices listen in each hour (s). The other laws always hold."""
 
-    def __init__(self, timeline: Timeline, ills: Ills) -> None:
+    def __init__(self, timeline: Timeline, ills: Ills, judged_s: float = HOUR_S) -> None:
         self.log: deque[tuple[float, str]] = deque(maxlen=600)
         self.checks = 0
         self._timeline = timeline
         self._ills = ills
+        self._judged_s = judged_s
         self._lifts: dict[str, LiftTruth] = {}
         self._doors: dict[str, float] = {}
         self._currents: dict[str, float] = {}
@@ -156,7 +158,6 @@ class Laws:
             self._currents[name] = -NEVER
         daemon.looks, daemon.scanned = self._see, self.scanned
         daemon.relayed = self._relay
-        self._judges[name] = Judges(daemon)
         daemon.started, daemon.hears = self._started, self._hears
 
     def note(self, what: str) -> None:
@@ -172,11 +173,17 @@ class Laws:
     # ---- messages
 
     def _started(self, daemon: DeviceDaemon) -> None:
-        self._judges[daemon.name] = Judges(daemon)
+        self._judges.pop(daemon.name, None)
 
     def _hears(self, daemon: DeviceDaemon, topic: topics.Topic[Any], message: Any) -> None:
-        """Give a message that has reached the node to the node's judges."""
+        """Give a message that has reached the node to the node's judges, if they listen now. Each time
+        they begin anew."""
         now = self._timeline.now
+        if now % HOUR_S >= self._judged_s:
+            self._judges.pop(daemon.name, None)
+            return
+        if daemon.name not in self._judges:
+            self._judges[daemon.name] = Judges(daemon)
         well = self._ills.well_since(daemon.name) + LATE_S < now
         broken = self._judges[daemon.name].hear(Heard(now, EPOCH + now, topic.name, message), well)
         self.require(not broken, broken)

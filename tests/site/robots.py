@@ -15,7 +15,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import duration
 from bridges.transports.transport import Transport
-from tests.site.charging import Charge
+from tests.site.charging import FLEET, Charge
 from tests.site.network import Heeded
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, RequestLift
@@ -97,7 +97,8 @@ class Resident:
     `join(name)` gives the robot's adapter a place on the graph. `pace` is the length of the robot's
     pauses relative to a real robot. `disturbed_at` is the time at which the adapter last died. After
     that time a request in the robot's name may come from a supervisor, and not from the robot. `heeds`
-    gets the topics and devices whose states can change anything for the robot.
+    gets the topics and devices whose states can change anything for the robot. With `tells` the adapter
+    publishes the state of a fleet that has only its robot.
     """
 
     def __init__(
@@ -111,6 +112,7 @@ class Resident:
         pace: float = 1.0,
         jazzy: bool = False,
         charge: Charge | None = None,
+        tells: bool = True,
     ) -> None:
         self.name = name
         self.floor = random.choice(places.floors)
@@ -134,6 +136,7 @@ class Resident:
         self._pace = pace
         self._jazzy = jazzy
         self._task = charge
+        self._tells = tells
         self._beat = Alarm(timeline, self._tell)
         self._alarm = Alarm(timeline, self._tick)
         self._until = NEVER
@@ -205,10 +208,15 @@ class Resident:
         self._say(self.robot.hear(message, self._wall))
         self._look()
 
+    def reported(self) -> d.RobotState | None:
+        """Return the robot's state for the fleet's state; None if no coordinator needs it."""
+        return self._task.state() if self._task else None
+
     def _tell(self) -> None:
-        """Publish the fleet's state, each second."""
-        if self._task and self.alive:
-            self._say([(topics.FLEET_STATES, self._task.state())])
+        """Publish the fleet's state, each second. This adapter knows only its own robot."""
+        robot = self.reported()
+        if robot and self._tells and self.alive:
+            self._say([(topics.FLEET_STATES, d.FleetState(FLEET, (robot,)))])
             self._beat.set(self._timeline.now + 1.0)
 
     def _tick(self) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from functools import partial
 
 NEVER = float("inf")
+HOUR_S = 3600.0
 EPOCH = 1_800_000_000.0
 """The wall clock at the day's beginning (s since the epoch)."""
 

@@ -45,7 +45,7 @@ class Fleet:
             one.hear(message)
 
     def _tick(self) -> None:
-        states = (one.state().robots[0] for one in self.robots.values())
+        states = (one.state() for one in self.robots.values())
         self._publisher.publish(d.FleetState("fleet", tuple(states)))
         self._timeline.after(1.0, self._tick)
 
