@@ -40,5 +40,5 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_UNAVAILABLE
     if code == 0:
         begun = f"the drill has begun, and ends by itself in {for_s:g} s; --end ends it earlier"
-        print("no ordered drill goes on" if args.end else begun)
+        print("no ordered drill goes on any more" if args.end else begun)
     return code

@@ -21,6 +21,7 @@ from bridges.runtime.daemons import folders as daemon_folders
 from bridges.runtime.faults import Remedy, here, remedies, values
 from bridges.runtime.services import service_name
 from bridges.runtime.subject import Status
+from bridges.system.log import plain
 from bridges.system.paint import bold, red
 
 IN_USE: Final[Mapping[str, tuple[str, ...]]] = {
@@ -182,7 +183,11 @@ def _state(one: DaemonStatus) -> str:
 
 
 def _told(device: Status) -> str:
-    told = ((key, value) for key, value in device.items() if key not in NOT_TOLD)
+    told = (
+        (key, f"({plain(value)})" if isinstance(value, Mapping) else value)
+        for key, value in device.items()
+        if key not in NOT_TOLD
+    )
     shown = ", ".join(f"{key} {value}" for key, value in told if value not in ("-", ""))
     return printable(shown) or "nothing to tell"
 

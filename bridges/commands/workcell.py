@@ -34,8 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the daemon accepted the decision. Return 1 if no daemon runs or nothing is in doubt,
-    and 4 if the daemon refused the decision.
+    """Return 0 if the daemon accepted the decision. Return 1 if no daemon runs, nothing is in doubt, or
+    the file has no device of that name. Return 4 if the daemon refused the decision.
 
     Return 69 if the order cannot be written, if the daemon does not answer, or if this user may not see
     the daemon or send it a signal.
@@ -47,6 +47,11 @@ def run(args: argparse.Namespace) -> int:
         status = order.status_of(places)
         if status is None:
             print(f"no daemon of {args.file} has written its status yet", file=sys.stderr)
+            return 1
+        names = status.get("devices", {})
+        if args.device and args.device not in names:
+            has = ", ".join(names)
+            print(f"{args.file} has no device '{args.device}'; it has {has}", file=sys.stderr)
             return 1
         doubts = list(_doubts(status, args.device))
         verdict = DecidedByPerson(args.verdict, args.request)

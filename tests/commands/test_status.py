@@ -171,6 +171,14 @@ def test_the_age_of_a_reading_counts_up_to_now(tmp_path: Path) -> None:
         assert shown(seen(folder, age_s=0.9))[-1] == "  Lift1: mode AGV, floor L1; read 0.9 s ago"
 
 
+def test_a_table_of_a_device_is_shown_in_words(tmp_path: Path) -> None:
+    content = lift()
+    content["devices"]["Lift1"]["last_refusal"] = {"request": "task-1", "reason": "no such floor"}
+    with served(tmp_path / "lift_a", content) as folder:
+        told = "mode AGV, floor L1, last_refusal (request task-1, reason no such floor)"
+        assert shown(seen(folder))[-1] == f"  Lift1: {told}; read 0.0 s ago"
+
+
 def test_outputs_that_nobody_has_verified_off_are_reported_even_without_a_status(
     tmp_path: Path,
 ) -> None:

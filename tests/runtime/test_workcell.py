@@ -117,8 +117,8 @@ def site(domain: int, tmp_path: Path) -> Iterator[Site]:
         yield Site(tmp_path, domain, stack)
 
 
-def decided(site: Site, verdict: str, run: Path) -> int:
-    return cli.main(["workcell", verdict, str(site.file), "--runtime-dir", str(run)])
+def decided(site: Site, verdict: str, run: Path, *more: str) -> int:
+    return cli.main(["workcell", verdict, str(site.file), "--runtime-dir", str(run), *more])
 
 
 @pytest.mark.long(20)
@@ -145,6 +145,8 @@ def test_a_daemon_that_is_killed_in_mid_cycle_leaves_the_outcome_to_a_person(
             site.look()
         assert site.outcome() == ""
         assert not site.says(d.WorkcellStatus.SUCCESS)
+        assert decided(site, "failed", run, "--device", "stor") == 1
+        assert "has no device 'stor'; it has store" in capsys.readouterr().err
         wait_until(lambda: decided(site, "failed", run) == 0, "a person decides")
         site.until(lambda: site.outcome() == "failed", "RMF hears the decision")
         wait_until(lambda: decided(site, "done", run) == 1, "nothing is in doubt any more")

@@ -150,7 +150,8 @@ def _one(site: HeardDevices, args: argparse.Namespace) -> int:
         return 2
     found = _explained(site, args.kind, name)
     _tell(found, as_json=args.json)
-    return 0 if found.kind == "robot" or (found.kind, name) in site.devices() else 1
+    known = found.kind == "robot" or (found.kind, name) in site.devices() or site.reports(name)
+    return 0 if known else 1
 
 
 def _explained(site: HeardDevices, given: Explained | None, name: str) -> Explanation:

@@ -86,7 +86,7 @@ def _told(
     if args.json:
         print(json.dumps(_as_json(head, course, differences, notes)))
     else:
-        for line in _lines(args, head, course, differences):
+        for line in _lines(args, head, course, differences) if course.decisions else ():
             print(line)
         if notes.damage:
             print(notes.damage, file=sys.stderr)

@@ -24,7 +24,16 @@ from bridges.observe.limits import FLAPS, MOST_DEVICES
 from bridges.observe.requesters import Moment
 from bridges.observe.robots import ObservedRobot, robots, waits
 from workbench.explain import answer as common
-from workbench.explain import charger, door, first_causes, known_defects, lift, robot, workcell
+from workbench.explain import (
+    charger,
+    daemon,
+    door,
+    first_causes,
+    known_defects,
+    lift,
+    robot,
+    workcell,
+)
 from workbench.explain.answer import Answer, FileReason, Remedies
 from workbench.explain.charger_facts import ChargerFacts
 from workbench.explain.charger_wishes import ChargerWishes, queue_of
@@ -154,6 +163,14 @@ class HeardDevices(ObservedGraph[Device]):
         every = (one for one in robots(self.nodes) if name in (one.who, one.who.rpartition("/")[2]))
         return next(every, None)
 
+    def reports(self, name: str) -> list[Diagnosis]:
+        """Return the reports on a daemon, alarm panel or coordinator of this name, if no device and no
+        robot with this name was heard."""
+        if self.kinds(name):
+            return []
+        named = ((one, one.name.partition(": ")) for one in self.nodes.values())
+        return [one for one, (node, _, subject) in named if name in (label(node), subject)]
+
     def asking(self, name: str) -> str:
         """Find a robot (FLEET/ROBOT, or ROBOT alone) by its requests, by the lift or charger that it
         has, or by the coordinator's queue. Return FLEET/ROBOT, or "" if there is no such robot."""
@@ -173,7 +190,10 @@ class HeardDevices(ObservedGraph[Device]):
         texts, or None for this machine's zone."""
         clock = TimePhrases(self.now, zone)
         if kind != "robot":
-            told = self._explain(kind, name, zone, remedies)
+            if reports := self.reports(name):
+                told = daemon.explanation(name, reports, clock, remedies or {})
+            else:
+                told = self._explain(kind, name, zone, remedies)
             return self._alarmed(told, [one for one in self.alarms() if one.stands], clock)
         one = self.robot(name)
         who = one.who if one else self.asking(name)

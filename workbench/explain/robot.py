@@ -23,6 +23,7 @@ STANDS: Final[Mapping[str, str]] = {
     "ROBOT_FAULT": "reports a fault of its own",
     "ROBOT_TAKEN_OUT": "takes no orders",
     "ROBOT_ON_OTHER_MAP": "is on a map that RMF's graph lacks",
+    "ROBOT_NOT_STOPPING": "does not stop",
     "ROBOT_NOT_OBEYING": "does not obey",
     "ROBOT_PAUSED_BY_OTHERS": "was paused by somebody else",
     "ROBOT_ACTION_FAILED": "began its action, and failed",
@@ -34,7 +35,6 @@ STANDS: Final[Mapping[str, str]] = {
     "ROBOT_AT_WRONG_STATION": "is at the wrong charger",
     "ROBOT_NOT_THERE": "reports an arrival, and is elsewhere",
     "ROBOT_PASSED_LIGHT": "drove on without permission of RMF's traffic light",
-    "ROBOT_NOT_STOPPING": "does not stop",
     "ROBOT_WITHOUT_PATH": "drives on a path that RMF does not know",
 }
 """Faults because of which a robot stands, or gets no task. The fault that explains most comes first."""

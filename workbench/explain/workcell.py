@@ -23,6 +23,9 @@ STOPS: Final = (
     "WORKCELL_FAULT",
 )
 """Faults because of which a workcell that can be read is OFFLINE, the most serious first."""
+REPEAT: Final = "for RMF to repeat the request"
+"""What the daemon says of a request that its fleet adapter has to send again (`report.py` of the
+dispensers)."""
 ENDS: Final = {
     "success": "It has succeeded: RMF goes on after the workcell's next state or result.",
     "failed": "It has failed: RMF ends the task.",
@@ -107,7 +110,14 @@ def _unasked(
         found.acts("the controller", "finish its cycle")
     elif workcell.mode.value == "offline":
         found.acts("a person", "find out why the workcell is offline")
-    elif queue and not heard:
+    elif queue and not heard and workcell.own(clock.now) is None:
         found.acts("a person", "find out why the workcell does not serve what it lists")
+    elif REPEAT in workcell.waits_said(clock.now).values():
+        found.acts("the fleet adapter", "repeat the request")
+    elif workcell.waits_said(clock.now):
+        found.acts("the controller", "become ready")
+    elif queue and not heard:
+        found.say("Its daemon says that nothing waits: the listed request has had its result.")
+        found.acts("nobody", "there is nothing to do")
     else:
         found.acts("nobody", "there is nothing to do")

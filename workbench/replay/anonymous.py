@@ -43,10 +43,11 @@ from bridges.blackbox.value_codec import HOLDS, TYPE, Tree
 from bridges.kinds import kind_called, kind_names
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages import cdr
-from bridges.messages.definitions import Message
+from bridges.messages.definitions import DiagnosticStatus, Message
 from bridges.messages.heard import FREE_TEXTS
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
+from bridges.runtime.faults import remedies
 from bridges.settings.config import Config
 from workbench.commissioning.json_schema import schema
 from workbench.replay.replayed import of_head
@@ -116,6 +117,8 @@ def _names_in(value: object, field: str = "") -> Iterator[str]:
     elif isinstance(value, tuple):
         for part in value:
             yield from _names_in(part, field)
+    elif isinstance(value, DiagnosticStatus):  # the keys of its values are our words
+        yield from (*value.name.split(": "), value.hardware_id)
     elif isinstance(value, msgspec.Struct):
         for name in value.__struct_fields__:
             yield from _names_in(getattr(value, name), name)
@@ -177,7 +180,7 @@ def _words(value: object) -> Iterator[str]:
 @cache
 def our_words() -> frozenset[str]:
     """Return every key and word of the program itself that a YAML or a core may contain."""
-    found = {"site", *TOPICS}
+    found = {"site", "daemon", *TOPICS, *remedies()}
     _schema_words(schema(), found)
     for kind in kind_names():
         package = f"bridges.kinds.{kind}"

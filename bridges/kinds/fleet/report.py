@@ -193,11 +193,13 @@ def _of_command(memory: RobotMemory, limits: RobotLimits) -> Iterator[Fault]:
             yield Fault("ROBOT_NOT_THERE", f"it reports arrival, but is {far} its goal")
     if memory.arrived_at is not None and command.goal:
         yield Fault("ROBOT_NOT_CHARGING", f"docked at {command.goal.dock} without a charge")
-    still = command.doing in ("stop", "pause") and stands(memory)
-    if memory.tries > limits.t.attempts and not still:
-        yield Fault("ROBOT_NOT_OBEYING", f"{limits.t.attempts} attempts in vain: {command.doing}")
-    elif command.doing in ("stop", "pause") and memory.tries > 1:
+    halts = command.doing in ("stop", "pause")
+    still = halts and stands(memory)
+    in_vain = memory.tries > limits.t.attempts and not still
+    if halts and memory.tries > 1:
         what = "it stands, but has not taken the" if still else "it drives on after a"
         yield Fault("ROBOT_NOT_STOPPING", f"{what} {command.doing}")
-    elif reading.busy and memory.tries > 1:
+    if in_vain:
+        yield Fault("ROBOT_NOT_OBEYING", f"{limits.t.attempts} attempts in vain: {command.doing}")
+    elif reading.busy and memory.tries > 1 and not halts:
         yield Fault("ROBOT_NOT_STOPPING", "it keeps an earlier order, although that was cancelled")

@@ -180,7 +180,7 @@ def test_a_robot_that_drives_on_is_stopped_again() -> None:  # FLEET-4
     ]
     assert story.faults == ["ROBOT_NOT_STOPPING"]
     story.see(4.0)
-    assert story.faults == ["ROBOT_NOT_OBEYING"]
+    assert story.faults == ["ROBOT_NOT_STOPPING", "ROBOT_NOT_OBEYING"]
 
 
 def test_a_robot_that_has_not_moved_off_yet_is_stopped_too() -> None:  # FLEET-4, FLEET-11
@@ -205,7 +205,7 @@ def test_a_stop_that_was_not_taken_is_sent_again_although_the_robot_stands() -> 
     assert story.report.faults == (Fault("ROBOT_NOT_STOPPING", text),)
     assert story.report.fit, "RMF's next order replaces the stop"
     story.see(1.0, moving=True)
-    assert story.faults == ["ROBOT_NOT_OBEYING"]
+    assert story.faults == ["ROBOT_NOT_STOPPING", "ROBOT_NOT_OBEYING"]
     story.see(taken=(8, 3), moving=False)
     assert story.memory.command is not None, "the robot may have driven since that stop"
     story.takes = True

@@ -180,7 +180,7 @@ def test_a_robot_that_does_not_pause_is_told_again_and_the_fault_said() -> None:
     assert story.commands[-1] == (3.0, "pause 1, attempt 2")
     assert story.report.faults == (Fault("ROBOT_NOT_STOPPING", "it drives on after a pause"),)
     story.see(6.5)
-    assert story.faults == ["ROBOT_NOT_OBEYING"]
+    assert story.faults == ["ROBOT_NOT_STOPPING", "ROBOT_NOT_OBEYING"]
     story.see(moving=False)
     assert story.memory.command is not None, "it stands, and does not report a pause"
     story.see(paused=True)

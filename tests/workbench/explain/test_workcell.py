@@ -98,6 +98,24 @@ def test_a_workcell_that_can_be_read_is_offline_for_its_fault(
     assert [(step.who, step.what.startswith(do)) for step in explained.next] == [("a person", True)]
 
 
+@pytest.mark.parametrize(
+    ("waits", "who"),
+    [
+        ("", "nobody"),  # after a failure the state lists the request for a day
+        ("for the workcell to be ready", "the controller"),
+        ("for RMF to repeat the request", "the fleet adapter"),
+    ],
+)
+def test_of_a_listed_request_its_own_daemon_says_whether_it_waits(waits: str, who: str) -> None:
+    site = HeardDevices()
+    for at, topic, message in states(9, 0, "task"):
+        site.take(Heard(at, WALL + at, f"dispenser_{topic}", message))
+        told = diagnosis("node", "dispenser", {}, {"store": {"waits": waits}}, stamp(WALL + at))
+        site.take(Heard(at, WALL + at, "diagnostics", told))
+    explained = site.explain("dispenser", "store", None, for_explain())
+    assert [step.who for step in explained.next] == [who]
+
+
 @pytest.mark.parametrize(("status", "waits"), [(0, [4.5]), (1, []), (2, [])])
 def test_a_wait_ends_with_its_result_though_rmf_repeats_the_request(
     status: int, waits: list[float]

@@ -13,8 +13,9 @@ from bridges.blackbox.incident import Incident, Note
 from bridges.kinds import lift
 from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.messages import cdr
-from bridges.messages.definitions import LiftState
+from bridges.messages.definitions import DiagnosticArray, LiftState, Time
 from bridges.messages.releases import KILTED
+from bridges.runtime.diagnostics import diagnosis
 from tests.workbench.replay.test_replay import CORPUS
 from workbench.replay.anonymous import ADDRESS, anonymous, our_words
 from workbench.replay.files import opened
@@ -76,6 +77,26 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
     )
 
 
+def test_the_codes_of_faults_and_the_keys_of_diagnostics_stay() -> None:
+    """Otherwise `explain` would have no remedy, and a replay would show other faults."""
+    yaml = (CONFIG / "lift_dry_contact.yaml").read_bytes()
+    head = Head("r", 1, "1", "lift", "/d.yaml", yaml, {}, False, {}, RecordingSettings())
+    fault = {"faults": [{"code": "OVERLOAD", "detail": "Lift1 waits for joe"}], "session": "joe"}
+    said = diagnosis("rmf_bridge_mary", "lift", {}, {"Lift1": fault}, Time(1))
+    entry = _spoken(LiftState(lift_name="Lift1", session_id="joe")), _spoken(said)
+    told = anonymous(Incident(head, [*entry])).entries[1]
+
+    assert isinstance(told, Spoken)
+    daemon, device = cdr.decode(type(said), told.cdr, KILTED).status
+    name = device.hardware_id
+    assert (daemon.name, daemon.values) == (f"{daemon.hardware_id}: daemon", said.status[0].values)
+    assert device.name == f"{daemon.hardware_id}: {name}"
+    values = {value.key: value.value for value in device.values}
+    who = values["session"]
+    assert values == {"kind": "lift", "OVERLOAD": f"{name} waits for {who}", "session": who}
+    assert {daemon.hardware_id, name, who}.isdisjoint({"rmf_bridge_mary", "Lift1", "joe"})
+
+
 def test_the_host_of_a_bus_is_hidden_in_the_texts_of_errors_too() -> None:
     yaml = (CONFIG / "door_modbus.yaml").read_text().replace("host: 192.168.1.50", "host: plc.mary")
     assert "plc.mary" in yaml
@@ -102,6 +123,9 @@ def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
         anonymous(whole(CORPUS[0]))
 
 
-def _spoken(state: LiftState) -> Spoken:
-    told = cdr.encode(LiftState, state, KILTED)
-    return Spoken(1.0, True, "lift_states", "rmf_lift_msgs/msg/LiftState", "kilted", told)
+def _spoken(said: LiftState | DiagnosticArray) -> Spoken:
+    told, topic = cdr.encode(type(said), said, KILTED), "lift_states"
+    kind = "rmf_lift_msgs/msg/LiftState"
+    if isinstance(said, DiagnosticArray):
+        topic, kind = "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"
+    return Spoken(1.0, True, topic, kind, "kilted", told)

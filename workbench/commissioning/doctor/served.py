@@ -66,8 +66,8 @@ def unseen(why: str) -> ServingDaemon:
 def _nobody(places: Directories, file: Path) -> ServingDaemon:
     if Records(places).unreleased():
         found = "the daemon has died, and may have left outputs on"
-        do = f"rmf-bridge outputs-off {file}"
-        return ServingDaemon([wrong(DAEMON, found, "a relay may hold a door or a call", do)], found)
+        do, means = f"rmf-bridge outputs-off {file}", "a relay may hold a door or a call"
+        return ServingDaemon([wrong(DAEMON, f"{found}; {NOT_ASKED}", means, do)], found)
     return ServingDaemon([ok(DAEMON, "no daemon serves this file, so its buses are read here")])
 
 

@@ -31,7 +31,7 @@ from tests.commands import runtime
 from tests.commands.terminal import Terminal
 from tests.runtime.site import Module, command, daemon, environment
 from tests.waiting import PATIENCE_S, wait_until
-from workbench.commissioning.doctor.served import served
+from workbench.commissioning.doctor.served import NOT_ASKED, served
 from workbench.commissioning.examples import CONFIG
 
 READS = {1, 2, 3, 4}
@@ -165,7 +165,7 @@ def test_after_a_death_the_outputs_come_first(
     code, found = doctor(tapped.file, tmp_path, "--listen", "0")
     assert (code, found["daemon"]) == (
         2,
-        [("wrong", "the daemon has died, and may have left outputs on")],
+        [("wrong", f"the daemon has died, and may have left outputs on; {NOT_ASKED}")],
     )
     assert tapped.clients == 0
 
