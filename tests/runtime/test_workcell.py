@@ -145,8 +145,12 @@ def test_a_daemon_that_is_killed_in_mid_cycle_leaves_the_outcome_to_a_person(
             site.look()
         assert site.outcome() == ""
         assert not site.says(d.WorkcellStatus.SUCCESS)
-        assert decided(site, "failed", run, "--device", "stor") == 1
-        assert "has no device 'stor'; it has store" in capsys.readouterr().err
+
+        def misspelt() -> bool:
+            assert decided(site, "failed", run, "--device", "stor") == 1
+            return "has no device 'stor'; it has store" in capsys.readouterr().err
+
+        wait_until(misspelt, "a misspelt device is named")
         wait_until(lambda: decided(site, "failed", run) == 0, "a person decides")
         site.until(lambda: site.outcome() == "failed", "RMF hears the decision")
         wait_until(lambda: decided(site, "done", run) == 1, "nothing is in doubt any more")
