@@ -16,7 +16,7 @@ from yaml import MappingNode
 
 from bridges.kinds.charger_coordinator.settings import CoordinatorSettings, FleetSettings, Waypoint
 from bridges.kinds.lift.settings import LiftSettings
-from bridges.kinds.shared.similarity import Point, Similarity, estimate
+from bridges.kinds.shared.similarity import Point, Similarity, estimate, odd_pair
 from bridges.settings.building_map import BuildingMap
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import EVERY_LEVEL, FleetFile
@@ -207,6 +207,7 @@ class _Comparing:
                 text = (
                     f"the pairs do not fit: they differ by {found.error:.2f} m on RMF's map, but near_m"
                     f" is {self._settings.near_m:g} m: a robot would not be seen at its waypoint"
+                    f"{odd_pair(pairs.rmf, pairs.robot, self._settings.near_m)}"
                 )
                 if estimate(pairs.rmf, _mirrored(pairs.robot)).error <= self._settings.near_m:
                     text = "one map is the other's mirror image: change the sign of every robot's y"

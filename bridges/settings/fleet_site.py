@@ -19,7 +19,7 @@ from yaml import SequenceNode
 from bridges.kinds.fleet.memory import RobotLimits
 from bridges.kinds.fleet.places import EVERY_LEVEL, NavGraph, RobotSite
 from bridges.kinds.fleet.settings import FleetFiles
-from bridges.kinds.shared.similarity import Similarity, estimate
+from bridges.kinds.shared.similarity import Similarity, estimate, odd_pair
 from bridges.settings.building_map import MAP
 from bridges.settings.config import Config
 from bridges.settings.fleet_config import FLEET, OF_MAPPING, ROBOTS, FleetFile, load_fleet
@@ -188,6 +188,7 @@ class _Comparing:
             if found[level].error > OFF_M:
                 text = (
                     f"the pairs do not fit: they differ by {found[level].error:.2f} m on RMF's map"
+                    f"{odd_pair(pairs.rmf, pairs.robot, OFF_M)}"
                 )
                 self.problems.append(fleet.problem(path, text))
             if level and level not in graph.levels():

@@ -143,7 +143,7 @@ def test_files_that_agree_give_no_problem_and_the_error_of_the_transform_is_repo
             "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",
             "robot: [[7, -5], [4, -5], [7, -11], [30, -11]]",
             "config.yaml:10:3: the pairs do not fit: they differ by 5.46 m on RMF's map, but near_m is"
-            " 1 m: a robot would not be seen at its waypoint",
+            " 1 m: a robot would not be seen at its waypoint; without pair 4 the others fit",
         ),
         (
             "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",

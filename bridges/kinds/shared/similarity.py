@@ -67,3 +67,23 @@ def estimate(these: Sequence[Point], those: Sequence[Point]) -> Similarity:
     shift = middle_q - turn * middle_p
     errors = (abs(turn * a + shift - b) ** 2 for a, b in zip(p, q, strict=True))
     return Similarity(turn, shift, sum(errors) / len(p))
+
+
+def odd_pair(these: Sequence[Point], those: Sequence[Point], most: float) -> str:
+    """Return a clause that names the pair without which the others fit, with an error of at most
+    `most`. Return "" if there is no such pair, more than one, or too few pairs to tell."""
+    if len(these) < 4:
+        return ""
+    left = [
+        [each for n, each in enumerate(zip(these, those, strict=True)) if n != odd]
+        for odd in range(len(these))
+    ]
+    fits = [n for n, pairs in enumerate(left, 1) if _fits(pairs, most)]
+    return f"; without pair {fits[0]} the others fit" if len(fits) == 1 else ""
+
+
+def _fits(pairs: Sequence[tuple[Point, Point]], most: float) -> bool:
+    try:
+        return estimate([one for one, _ in pairs], [other for _, other in pairs]).error <= most
+    except ValueError:
+        return False
