@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridges.cli import main
-from bridges.kinds.shared.similarity import Point, estimate
+from bridges.kinds.shared.similarity import Point, estimate, odd_pair
 from bridges.settings.fleet_config import load_fleet
 from bridges.settings.load import SettingsError
 
@@ -417,3 +417,13 @@ def test_points_that_define_no_transform_are_refused(
 def test_a_file_that_cannot_be_read_is_a_problem_of_that_file(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="cannot be read: No such file"):
         load_fleet(str(tmp_path / "none.yaml"))
+
+
+def test_a_pair_is_named_only_if_the_others_fit_without_it_alone() -> None:
+    these = [(0.0, 0.0), (10.0, 0.0), (0.0, 10.0), (10.0, 10.0), (5.0, 20.0)]
+    those = [(x + 3.0, y - 2.0) for x, y in these]
+    assert odd_pair(these, those, 0.5) == "", "all fit, so none is odd"
+    assert odd_pair(these, [*those[:4], (90.0, 0.0)], 0.5) == "; without pair 5 the others fit"
+    assert odd_pair(these, [(40.0, 0.0), *those[1:4], (90.0, 0.0)], 0.5) == ""
+    assert odd_pair(these[:3], [*those[:2], (90.0, 0.0)], 0.5) == "", "any two pairs fit"
+    assert odd_pair([these[0]] * 3 + [these[1]], those[:4], 0.5) == ""

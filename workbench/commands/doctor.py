@@ -44,7 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also write the form of docs/how-to/hardware.md, which a person completes",
     )
     parser.add_argument(
-        "--scan", action="store_true", help="ask every unit or node of a bus, not only 1 to 16"
+        "--scan",
+        action="store_true",
+        help="ask every unit or node of a bus, not only 1 to 16; list the topics of a broker",
     )
     parser.add_argument(
         "--listen",
