@@ -138,11 +138,32 @@ def test_a_lost_height_is_a_fault_although_the_power_ended_the_charge_before_it_
     assert it.state == ("ASSIGNED", "req-2")
 
 
+def test_a_station_that_goes_on_charging_at_a_lost_height_is_to_be_cut_off() -> None:
+    it = charging()
+    for _ in range(60):
+        it.shows(charging=True, at_height=False, lasts=1.0)
+    assert it.outputs.power is False
+    said = "station: it goes on charging after an order to stop; cut its supply"
+    assert f"PROTECTION: out of service after: {said}" in it.faults
+
+
 def test_a_pad_that_sinks_after_the_charge_is_no_fault_even_if_charging_bounces() -> None:
     it = charging().shows(charging=False, ready=False, at_height=False, lasts=1.0)
     it.shows(charging=True, ready=False, at_height=False, lasts=0.002)
     it.shows(charging=False, ready=False, at_height=False, lasts=1.0)
     assert it.state == ("RELEASED", "req-1")
+
+
+# ---- a poll fails now and then
+
+
+def test_a_bus_that_fails_at_every_second_poll_makes_no_charger_unreachable() -> None:
+    """A failed poll restarts the debounce, but what has settled still counts."""
+    it = charging()
+    for _ in range(10):
+        it.event(SILENT)
+        it.shows(charging=True, lasts=0.02)
+    assert (it.state, it.outputs.power) == (("CHARGING", "req-1"), True)
 
 
 # ---- CHARGER-SENSING-4: contacts that never settle

@@ -31,6 +31,10 @@ def test_with_supervisor_lost_s_the_hold_ends_after_that_time_and_a_fault_says_w
         (0, ()),
         (80, ("SUPERVISOR_LOST",)),
     ]
+    said = [fault for fault in door.report.faults if fault.code == "SUPERVISOR_LOST"]
+    assert [one.detail for one in said] == [
+        "no node has published door_requests for 60.0 s, so the hold has ended"
+    ]
     door.scan(Attended(True))
     assert door.faults[-1][1] == ()
 

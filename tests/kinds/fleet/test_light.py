@@ -183,6 +183,9 @@ def test_a_robot_that_does_not_pause_is_told_again_and_the_fault_said() -> None:
     assert story.faults == ["ROBOT_NOT_STOPPING", "ROBOT_NOT_OBEYING"]
     story.see(moving=False)
     assert story.memory.command is not None, "it stands, and does not report a pause"
+    story.see(3.0, moving=False)
+    text = "it stands, but has not taken the pause"
+    assert story.report.faults == (Fault("ROBOT_NOT_STOPPING", text),)
     story.see(paused=True)
     assert story.memory.command is None
 

@@ -124,3 +124,19 @@ def test_a_request_that_waits_is_explained_by_its_mode_or_by_the_faults_that_hin
     codes = [fault.code for fault in lift.faults]
     assert codes == ["CODE_BLUE", "OUT_OF_SERVICE", "FORGOTTEN_BY_SUPERVISOR"]
     assert lift.decision.report.waits == "for the end of CODE_BLUE, OUT_OF_SERVICE"
+
+
+def test_a_request_waits_for_the_car_until_it_stands_and_for_nothing_once_it_is_open() -> None:
+    lift = Alone()(0.0, CLOSED)(5.0, CLOSED, LiftRequested("A", True, "L3"))(5.5, CLOSED)
+    away = replace(CLOSED, motion=Motion.UP)
+    assert lift(6.0, away).decision.report.waits == "for the car at L3"
+    near = replace(away, level="L3")
+    assert (
+        lift(6.5, near)(7.0, near).decision.report.waits == "for the car to be seen to stand at L3"
+    )
+    there = replace(CLOSED, level="L3")
+    lift(7.5, there)(8.0, there)(8.6, there)
+    assert lift.decision.report.waits == "for the door at L3"
+    opened = replace(there, door=DoorReading.OPEN)
+    lift(9.0, opened)(9.5, opened)
+    assert (lift.decision.report.open_at, lift.decision.report.waits) == ("L3", "")
