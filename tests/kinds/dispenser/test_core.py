@@ -21,7 +21,7 @@ from bridges.kinds.dispenser.memory import (
     changes,
 )
 from bridges.kinds.dispenser.report import WorkcellReport
-from bridges.kinds.dispenser.settings import WorkcellDurations
+from bridges.kinds.dispenser.settings import WorkcellDurations, WorkcellSettings
 from bridges.kinds.dispenser.signals import Item, ItemRequested, WorkcellOutputs, WorkcellSample
 from bridges.kinds.shared.debounce import Settled
 from bridges.kinds.shared.decision import (
@@ -465,3 +465,9 @@ def test_the_core_wakes_for_each_of_its_time_limits() -> None:
         201.0,  # done has not come
         320.0,  # request a is closed
     ]
+
+
+def test_the_limits_are_those_of_the_file() -> None:
+    limits = WorkcellDurations(cycle_limit_s=60.0)
+    settings = WorkcellSettings(limits=limits, pulse_s=2.0)
+    assert WorkcellLimits.of(settings, {"done": 0.1}) == WorkcellLimits(limits, {"done": 0.1}, 2.0)
