@@ -93,6 +93,7 @@ class OthersHeard:
     - `reason`: the recorder's reason to keep the file.
     - `senders`: the nodes that publish each topic on a live graph; None if the nodes are unknown, as in
       a recording.
+    - `reported`: the daemons, panels and coordinators that only report on `/diagnostics`.
     - `live`: whether a live graph is heard, with every topic. A recording may lack topics.
     """
 
@@ -102,6 +103,7 @@ class OthersHeard:
     remedies: Remedies = field(default_factory=dict)
     reason: FileReason | None = None
     senders: Mapping[str, Sequence[str]] | None = None
+    reported: tuple[str, ...] = ()
     live: bool = False
 
     def nobody_publishes(self, topic: str) -> bool:
@@ -118,7 +120,11 @@ def unheard(device: Device, around: OthersHeard, lists: str = "") -> Answer:
     """Answer for a device whose states were never heard. `lists`: the node that lists the device, so
     its name is not misspelt; "" if none does."""
     answer = Answer(since=device.began.at, because=SILENCES)
-    others = (*around.names.get(device.kind, ()), *around.names.get("robot", ()))
+    others = (
+        *around.names.get(device.kind, ()),
+        *around.names.get("robot", ()),
+        *around.reported,
+    )
     if not around.messages:
         nodes = sorted(
             {label(one) for senders in (around.senders or {}).values() for one in senders}

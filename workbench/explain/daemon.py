@@ -15,9 +15,10 @@ KINDS: Final = {"daemon": "a daemon", PANEL: "an alarm panel", COORDINATOR: "a c
 
 
 def explanation(
-    name: str, reports: Collection[Diagnosis], clock: TimePhrases, remedies: Remedies
+    name: str, reports: Collection[Diagnosis], heard: str, clock: TimePhrases, remedies: Remedies
 ) -> Explanation:
-    """Say what the name is, whether its daemon is heard, and which of its faults need a person."""
+    """Say what the name is, whether its daemon is heard, and which of its faults need a person.
+    `heard`: the span of time of the messages."""
     found, now = Answer(), clock.now.at
     kinds = dict.fromkeys(KINDS.get(one.subject[0], "a device") for one in reports)
     found.say(f"{name} is {listed([*kinds])} of rmf-bridges, and publishes no state of a device.")
@@ -38,6 +39,4 @@ def explanation(
             found.acts("a person", do)
     if not found.next:
         found.acts("nobody", "there is nothing to do")
-    first = min(reports, key=lambda one: one.last.at)
-    heard = f"until {clock.date(first.last.wall)}"
     return Explanation("device", label(name), heard, tuple(found.now), tuple(found.next))

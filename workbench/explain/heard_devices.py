@@ -19,7 +19,7 @@ from bridges.messages.heard import Heard, Own
 from bridges.messages.words import KINDS, Kind
 from bridges.observe.alarms import ObservedAlarm
 from bridges.observe.all_devices import Key, ObservedGraph
-from bridges.observe.diagnosis import COORDINATOR, Diagnosis
+from bridges.observe.diagnosis import COORDINATOR, FLEET, Diagnosis
 from bridges.observe.limits import FLAPS, MOST_DEVICES
 from bridges.observe.requesters import Moment
 from bridges.observe.robots import ObservedRobot, robots, waits
@@ -168,8 +168,7 @@ class HeardDevices(ObservedGraph[Device]):
         robot with this name was heard."""
         if self.kinds(name):
             return []
-        named = ((one, one.name.partition(": ")) for one in self.nodes.values())
-        return [one for one, (node, _, subject) in named if name in (label(node), subject)]
+        return [one for one in self.nodes.values() if name in _names(one)]
 
     def asking(self, name: str) -> str:
         """Find a robot (FLEET/ROBOT, or ROBOT alone) by its requests, by the lift or charger that it
@@ -191,7 +190,7 @@ class HeardDevices(ObservedGraph[Device]):
         clock = TimePhrases(self.now, zone)
         if kind != "robot":
             if reports := self.reports(name):
-                told = daemon.explanation(name, reports, clock, remedies or {})
+                told = daemon.explanation(name, reports, self._heard(clock), clock, remedies or {})
             else:
                 told = self._explain(kind, name, zone, remedies)
             return self._alarmed(told, [one for one in self.alarms() if one.stands], clock)
@@ -253,7 +252,6 @@ class HeardDevices(ObservedGraph[Device]):
     ) -> Explanation:
         """Explain the device at the time of the last message. `zone` is the time zone of the texts, or
         None for this machine's zone."""
-        began = self.began or self.now
         last = self.known.get((kind, name)) or self.make(kind, name)
         at_end = self.now, last, self.spoke
         now, device, spoke = self._then.get((kind, name), at_end)
@@ -277,11 +275,10 @@ class HeardDevices(ObservedGraph[Device]):
             later = f"{words.condition(last.state)}{held}"
             answer.say(f"At the end of the file, at {clock.time(self.now.wall)}: {label(later)}.")
         story = self._story(device, answer)
-        for_s = lasted(self.now.at - began.at)
         return Explanation(
             kind=kind,
             device=label(name),
-            heard=f"{clock.date(began.wall)} to {clock.time(self.now.wall)} ({for_s})",
+            heard=self._heard(clock),
             now=tuple(answer.now),
             next=tuple(
                 NextStep(step.who, on_graph(step.what, self._graph))
@@ -304,6 +301,12 @@ class HeardDevices(ObservedGraph[Device]):
             before=_before(device, clock),
         )
 
+    def _heard(self, clock: TimePhrases) -> str:
+        """Return the span of time of the messages, as text."""
+        began = self.began or self.now
+        for_s = lasted(self.now.at - began.at)
+        return f"{clock.date(began.wall)} to {clock.time(self.now.wall)} ({for_s})"
+
     def _around(
         self, spoke: Mapping[str, Moment], reason: FileReason | None, remedies: Remedies
     ) -> common.OthersHeard:
@@ -314,8 +317,9 @@ class HeardDevices(ObservedGraph[Device]):
         reported = (one.who for one in robots(self.nodes))
         names["robot"] = tuple(dict.fromkeys((*reported, *map(label, self._askers()))))
         live = self._live or self.senders is not None
+        reported = dict.fromkeys(name for one in self.nodes.values() for name in _names(one))
         return common.OthersHeard(
-            names, self.messages, spoke, remedies, reason, self.senders, live=live
+            names, self.messages, spoke, remedies, reason, self.senders, (*reported,), live
         )
 
     def _answer(self, device: Device, clock: TimePhrases, around: common.OthersHeard) -> Answer:
@@ -399,6 +403,13 @@ class HeardDevices(ObservedGraph[Device]):
             f"At {clock.time(moment.wall)} the listener's clock was stepped by {by_s:+.0f} s."
             for moment, by_s in self.steps
         )
+
+
+def _names(said: Diagnosis) -> tuple[str, ...]:
+    """Return the names of the daemon and of the panel or site that a report is about. A robot's name is
+    left out, because robots are found by FLEET/ROBOT."""
+    node, _, subject = said.name.partition(": ")
+    return (label(node),) if subject == "daemon" or said.kind == FLEET else (label(node), subject)
 
 
 def _holder(device: Device) -> str:

@@ -62,3 +62,5 @@ def test_a_misspelt_name_is_still_nobodys() -> None:
     said = diagnosis("panels", "alarm", {}, {"Main panel": {}}, stamp(WALL))
     site.take(Heard(0.0, WALL, "diagnostics", said))
     assert site.reports("Main pannel") == []
+    (step,) = site.explain("lift", "Main pannel", None).next
+    assert "did you mean Main panel?" in step.what
