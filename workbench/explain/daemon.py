@@ -21,7 +21,7 @@ def explanation(
     `heard`: the span of time of the messages."""
     found, now = Answer(), clock.now.at
     kinds = dict.fromkeys(KINDS.get(one.subject[0], "a device") for one in reports)
-    found.say(f"{name} is {listed([*kinds])} of rmf-bridges, and publishes no state of a device.")
+    found.say(f"{name} is {listed([*kinds])} of rmf-bridges, and no device with a state.")
     last = max(reports, key=lambda one: one.last.at)
     if not last.is_current(now):
         found.say(

@@ -317,9 +317,9 @@ class HeardDevices(ObservedGraph[Device]):
         reported = (one.who for one in robots(self.nodes))
         names["robot"] = tuple(dict.fromkeys((*reported, *map(label, self._askers()))))
         live = self._live or self.senders is not None
-        reported = dict.fromkeys(name for one in self.nodes.values() for name in _names(one))
+        named = dict.fromkeys(name for one in self.nodes.values() for name in _names(one))
         return common.OthersHeard(
-            names, self.messages, spoke, remedies, reason, self.senders, (*reported,), live
+            names, self.messages, spoke, remedies, reason, self.senders, (*named,), live
         )
 
     def _answer(self, device: Device, clock: TimePhrases, around: common.OthersHeard) -> Answer:
