@@ -121,7 +121,7 @@ def test_a_simulation_can_be_pressed_and_failed_and_each_action_is_recorded(
 def test_what_the_driver_senses_is_seen_live(tab: Page, address: str, until: Until) -> None:
     tab.goto(f"{address}door/ward_door")
     until(lambda: "Levels now" in main(tab), "the levels")
-    assert re.search(r"closed\s+sensed\s+on", main(tab))
+    until(lambda: bool(re.search(r"closed\s+sensed\s+on", main(tab))), "the door's contact")
 
 
 def test_a_release_reaches_the_daemon(
