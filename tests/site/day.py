@@ -183,8 +183,8 @@ class Site:
             self.timeline.after(self.random.uniform(2.0, 6.0), party.start)
         self.timeline.after(LOOK_EVERY_S, self._watch)
         if self.size is not SITE and self.coordinated:
-            self._fleet_place = Place(self.air, "fleet", lambda: None)
-            self._fleet_states = self._fleet_place.publisher(FLEET_STATES)
+            place = Place(self.air, "fleet", lambda: None)
+            self._fleet_states = place.publisher(FLEET_STATES)
             self._tell_fleet()
 
     def _tell_fleet(self) -> None:

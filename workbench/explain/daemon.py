@@ -7,7 +7,7 @@ from typing import Final
 from bridges.observe.diagnosis import COORDINATOR, PANEL, Diagnosis
 from workbench.explain.answer import Answer, Remedies
 from workbench.explain.explanation import Explanation
-from workbench.explain.first_causes import HARMLESS
+from workbench.explain.first_causes import HARMLESS, named
 from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
@@ -32,9 +32,7 @@ def explanation(
         )
     for code, detail in dict.fromkeys(fault for one in reports for fault in one.every_fault):
         cause, do = remedies.get(code, (f"its daemon reports {code}", f"mend {code}"))
-        found.say(
-            f"It has a fault, {code}{f': {detail}' if detail else ''}. The likely cause: {cause}."
-        )
+        found.say(f"It has a fault, {named(code, detail)}. The likely cause: {cause}.")
         if not do.startswith(HARMLESS):
             found.acts("a person", do)
     if not found.next:

@@ -170,7 +170,7 @@ def own_fault(
     names = {"end": end, "contact": {"open": "'opened'", "shut": "'closed'"}[end]}
     found.because = ()
     found.say(
-        f"{device.name} has a fault of its own, {_named(code, present[code])}."
+        f"{device.name} has a fault of its own, {named(code, present[code])}."
         f" {why.format(**names) or f'The likely cause: {cause}.'}",
         "a person",
         look.format(**names) or do,
@@ -178,7 +178,8 @@ def own_fault(
     return True
 
 
-def _named(code: str, detail: str) -> str:
+def named(code: str, detail: str) -> str:
+    """Return the fault's code and detail, for the middle of a sentence."""
     return f"{code}: {detail.rstrip('.?')}" if detail else code
 
 
@@ -190,7 +191,7 @@ def needs_a_person(found: Answer, device: Device, clock: TimePhrases, around: Ot
         cause, do = around.remedies.get(code, ("", "nothing"))
         if not do.startswith(HARMLESS):
             found.because = tuple(other for other in faults if other != code)
-            what = f"But {device.name} has a fault, {_named(code, detail)}."
+            what = f"But {device.name} has a fault, {named(code, detail)}."
             found.say(f"{what} The likely cause: {cause}.", "a person", do)
             return True
     return False

@@ -96,6 +96,7 @@ def _unasked(
     repeated before we listened, or on a topic that was not recorded."""
     queue, text = workcell.queue.value, "Nobody requests the workcell."
     heard = [one.who for one in workcell.requesters if workcell.lists(one.who)]
+    waits = workcell.waits_said(clock.now).values()
     if queue and len(heard) == len(queue.split(", ")):
         text += f" Its state still lists {queue}, but no fleet adapter repeats it."
     elif queue:
@@ -112,9 +113,9 @@ def _unasked(
         found.acts("a person", "find out why the workcell is offline")
     elif queue and not heard and workcell.own(clock.now) is None:
         found.acts("a person", "find out why the workcell does not serve what it lists")
-    elif REPEAT in workcell.waits_said(clock.now).values():
+    elif REPEAT in waits:
         found.acts("the fleet adapter", "repeat the request")
-    elif workcell.waits_said(clock.now):
+    elif waits:
         found.acts("the controller", "become ready")
     elif queue and not heard:
         found.say("Its daemon says that nothing waits: the listed request has had its result.")

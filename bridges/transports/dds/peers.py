@@ -86,8 +86,10 @@ class DdsPeers:
         return {key.bytes for key in self._peers.present() if isinstance(key, uuid.UUID)}
 
     def _take_one(self, reader: BuiltinReader, publishes: bool) -> bool:
-        """Take one announcement. Return whether there was one that could be read. Of several
-        announcements at once, DDS would give none if it could not read one of them."""
+        """Take the next announcement, and return whether there was one that could be read.
+
+        Announcements are taken one by one, because DDS gives none of several if one of them cannot be
+        read."""
         try:
             samples = reader.take(1)
             for sample in samples:
