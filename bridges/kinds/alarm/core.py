@@ -46,7 +46,7 @@ def decide(
         case IoFailed(reason):
             kept = {name: forget(old, hazard=True) for name, old in memory.sources.items()}
             memory = replace(memory, io_fault=reason, sources=kept, drill=forget(memory.drill))
-    wake_at = min((at for at in _wakes(memory, now, limits) if at > now), default=NEVER)
+    wake_at = min((at for at in _wakes(memory, limits) if at > now), default=NEVER)
     return Decision(memory, PanelOutputs(), _report(memory, now, limits), wake_at)
 
 
@@ -126,7 +126,7 @@ def _faults(
         yield Fault("ALARM_DRILL", "a drill, which ends by itself")
 
 
-def _wakes(memory: PanelMemory, now: float, limits: PanelLimits) -> Iterator[float]:
+def _wakes(memory: PanelMemory, limits: PanelLimits) -> Iterator[float]:
     """Yield each time at which the decision may change without an event."""
     for name, one in memory.sources.items():
         yield one.due_at(_hold_s(name, one, one.candidate, limits))

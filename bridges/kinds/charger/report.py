@@ -221,8 +221,7 @@ def _irregular(
         return [fault] if shown is CHARGING else []
     since = memory.disobeyed_since
     still = since is not None and now - since >= STOPS_WITHIN_S
-    stopping = memory.sample and memory.sample.activity is Activity.STOPPING
-    if shown is CHARGING and still and not stopping and holder.over and holder.ended != "full":
+    if shown is CHARGING and still and holder.over and holder.ended != "full":
         whose = holder.request.request_id or holder.request.who
         return [Fault("STILL_CHARGING", f"{whose}: {_over(holder)}")]
     if shown is RELEASED and holder.ended == "start timeout":

@@ -84,7 +84,7 @@ def decide(
         memory=memory,
         outputs=DoorOutputs(memory.held and is_on, between_pulses=memory.held and not is_on),
         report=report(memory, view, now, limits),
-        wake_at=min((at for at in _wakes(memory, view, now, limits) if at > now), default=NEVER),
+        wake_at=min((at for at in _wakes(memory, view, limits) if at > now), default=NEVER),
         refused=refused,
     )
 
@@ -202,9 +202,7 @@ def _pulse(memory: DoorMemory, event: Event, now: float, limits: DoorLimits) -> 
     return replace(memory, pulses=advance(memory.pulses, failed, now, limits.pulse))
 
 
-def _wakes(
-    memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
-) -> Iterator[float]:
+def _wakes(memory: DoorMemory, view: BelievedDoor, limits: DoorLimits) -> Iterator[float]:
     """Yield each time at which the decision may change without an event."""
     yield view.changes_at
     yield NEVER if memory.close_at is None else memory.close_at

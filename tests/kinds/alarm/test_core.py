@@ -154,6 +154,22 @@ def test_the_core_wakes_to_read_a_source_that_has_kept_changing() -> None:
     ]
 
 
+def test_a_source_with_a_long_debounce_is_no_fault_before_it_is_active() -> None:
+    """ALARM-1: the debounce is longer than `clear_s`."""
+    limits = replace(LIMITS, t=PanelDurations(stale_after_s=60.0), debounce={"fire": 3.0})
+    memory = core.initial(limits, 0.0)
+    for now in (0.0, 3.0):
+        off = Sampled(PanelSample({"fire": False}))
+        memory = core.decide(memory, off, now, limits).memory
+    told = []
+    for now in (5.0, 9.5, 10.0):
+        for on in (True, False):
+            made = core.decide(memory, Sampled(PanelSample({"fire": on})), now, limits)
+            memory = made.memory
+        told.append([fault.code for fault in made.report.faults])
+    assert told == [[], [], ["ALARM_SOURCE_ACTIVE", "HAZARD_INPUTS_UNSTEADY"]]
+
+
 def test_a_source_behind_a_bus_that_fails_from_the_start_is_no_alarm() -> None:
     """ALARM-1: the source never settles, but no reading has shown a fire."""
     panel = Panel()

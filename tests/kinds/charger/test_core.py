@@ -99,6 +99,16 @@ def test_a_waiting_request_names_what_it_waits_for(measured: Measured, reason: s
     assert (story.report.state, story.report.waits) == (State.CHARGER_ASSIGNED, reason)
 
 
+def test_a_charge_whose_robot_leaves_its_range_says_why_it_gets_no_power() -> None:
+    story = Story(FULL).sees((Activity.IDLE, "rx-1", 1)).event(AMR1)
+    story.sees((Activity.CHARGING, "rx-1", 1))
+    assert story.report is not None
+    assert (story.outputs.power, story.report.waits) == (True, "")
+    story.sees((Activity.CHARGING, "rx-1", 1), range_ok=False)
+    assert story.outputs.power is False
+    assert story.report.waits == "because the robot is not in range"
+
+
 def test_time_to_full_and_measurements_are_reported_but_cause_no_message() -> None:
     story = Story().polls("idle 1").event(AMR1)
     reports = []
@@ -108,7 +118,7 @@ def test_time_to_full_and_measurements_are_reported_but_cause_no_message() -> No
         reports.append(story.report)
     assert reports[0].measured == Measured(volts=48.0, time_to_full_s=600.0)
     assert reports[0] != reports[1]
-    assert reports[0].news() == reports[1].news()
+    assert reports[0].news() == replace(reports[1], waits="for the robot").news()
 
 
 def test_measurements_of_a_lost_station_are_not_shown() -> None:
@@ -222,6 +232,18 @@ def test_a_coupling_that_is_lost_after_a_long_charge_gets_its_whole_start_timeou
     ]
 
 
+def test_a_charge_from_before_a_restart_that_loses_its_coupling_gets_its_whole_start_timeout() -> (
+    None
+):
+    story = Story(FULL).sees((Activity.CHARGING, "rx-1", 2)).event(AMR1)
+    story.sees((Activity.HANDSHAKE, "rx-1", 62))
+    assert story.told[1:] == [
+        (2.0, "CHARGING", "req-1"),
+        (2.0, "ASSIGNED", "req-1"),
+        (62.0, "RELEASED", "req-1"),
+    ]
+
+
 # ---- CHARGER-4: cancels
 
 
@@ -238,6 +260,8 @@ def test_a_cancel_during_a_charge_ends_the_power_and_shows_charging_until_the_cu
     assert story.outputs.power is True
     story.event(CANCEL_1)
     assert story.outputs.power is False
+    assert story.report is not None
+    assert story.report.waits == "for the station to stop: cancelled"
     story.polls("charging 2, stopping 3, released 1, idle 2")
     assert story.told[2:] == [
         (1.0, "CHARGING", "req-1"),
@@ -251,6 +275,15 @@ def test_a_station_that_goes_on_charging_for_three_seconds_after_a_cancel_is_a_f
     story = Story().polls("idle 1").event(AMR1).polls("charging 2").event(CANCEL_1)
     assert story.polls("charging 3").faults == []
     assert story.polls("charging 1").faults == ["STILL_CHARGING: req-1: cancelled"]
+
+
+def test_a_full_robot_that_is_still_charged_is_no_charge_against_an_order() -> None:
+    full = measured(CHARGING.sample, battery_percent=100.0)
+    story = Story().polls("idle 1").event(AMR1)
+    for _ in range(10):
+        story.event(full)
+        story.now += 1.0
+    assert (story.outputs.power, story.faults) == (False, [])
 
 
 def test_a_cancel_during_the_restart_delay_only_keeps_the_power_off() -> None:
@@ -353,7 +386,11 @@ def test_a_ramp_down_after_an_error_is_not_another_fault() -> None:
 
 
 def test_after_an_error_only_a_new_request_gives_power() -> None:
-    story = Story().polls("idle 1").event(AMR1).polls("hot 1, handshake 2, charging 4")
+    story = Story().polls("idle 1").event(AMR1).polls("hot 1, handshake 2")
+    assert story.report is not None
+    waits = "for the end of the charger's handshake: the charger was at fault before"
+    assert story.report.waits == waits
+    story.polls("charging 4")
     assert story.told[2:] == [
         (1.0, "ERROR", "over temperature"),
         (2.0, "ASSIGNED", "req-1"),

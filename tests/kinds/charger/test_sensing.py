@@ -4,6 +4,7 @@ and its default debounce."""
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.kinds.charger.memory import ChargerLimits
 from bridges.kinds.charger.settings import ChargerDurations
@@ -93,6 +94,20 @@ def test_a_change_that_lasts_counts_after_its_debounce(
     it.shows(**change, lasts=hold_s)
     assert it.state == ("CHARGING", "req-1")
     assert it.shows(**change, lasts=0.01).state == state
+
+
+def test_a_bounce_of_the_range_does_not_delay_the_end_of_a_charge() -> None:
+    it = charging()
+    for range_ok in (True, False, True):
+        it.shows(charging=False, ready=False, range_ok=range_ok, lasts=0.02)
+    assert it.state == ("RELEASED", "req-1")
+
+
+def test_a_pad_that_is_low_for_less_than_its_debounce_is_no_fault() -> None:
+    it = charging()
+    it.limits = replace(LIMITS, debounce={**DEBOUNCE, "at_height": 0.3})
+    it.shows(charging=True, at_height=False, lasts=0.25).shows(charging=True, lasts=1.0)
+    assert it.state == ("CHARGING", "req-1")
 
 
 def test_a_failed_reading_restarts_the_debounce() -> None:

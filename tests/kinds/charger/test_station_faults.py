@@ -113,6 +113,14 @@ def test_a_good_reading_proves_a_clearing_until_the_end_of_its_time() -> None:
     assert shown_after(CLEARED_WITHIN_S + 0.001) == "ERROR"
 
 
+def test_a_clearing_that_was_written_counts_although_a_later_command_fails() -> None:
+    it = story().event(at_fault("fan stuck", "station")).event(RESET)
+    it.event(at_fault("fan stuck", "station")).now += 1.0
+    it.event(at_fault("fan stuck", "station")).event(WriteFailed("timeout"))
+    it.sees((A.IDLE, NOBODY, 1))
+    assert it.memory.protection == ""
+
+
 def test_a_station_that_charges_or_is_unknown_proves_no_clearing() -> None:
     it = docked().event(at_fault("fan stuck")).sees((A.CHARGING, ONE, 1)).event(RESET)
     it.sees((A.CHARGING, ONE, 1), (A.STOPPING, ONE, 1), (A.UNKNOWN, ONE, 1))
@@ -166,6 +174,13 @@ def test_a_station_that_obeys_after_an_outage_stays_in_service() -> None:
     it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("timeout")).polls("silent 40")
     it.sees((A.CHARGING, ONE, 1), (A.STOPPING, ONE, 1), (A.IDLE, NOBODY, 3))
     assert (it.told[-1][1], it.memory.protection) == ("IDLE", "")
+
+
+def test_after_three_failed_commands_the_stop_has_its_whole_time_again() -> None:
+    it = docked().event(CANCEL_1).sees((A.CHARGING, ONE, 20)).all([WriteFailed("status 500")] * 3)
+    it.sees((A.CHARGING, ONE, 31))
+    assert it.memory.protection == ""
+    assert it.sees((A.CHARGING, ONE, 1)).memory.protection != ""
 
 
 @pytest.mark.parametrize("asked", [True, False])

@@ -256,6 +256,16 @@ def test_a_robot_loses_the_lost_station_that_charged_it_once_its_fleet_has_seen_
     assert stations.in_time(unseen, 90.0, SITE) == unseen
 
 
+@pytest.mark.parametrize(("seen_at", "loses"), [(69.9, False), (70.0, True)])
+def test_a_robot_loses_the_station_that_charged_it_if_another_robot_keeps_its_pad(
+    seen_at: float, loses: bool
+) -> None:
+    robots = {ONE: replace(at(ONE, "wait_1", 25.0), at=seen_at)}
+    known = {A: shows(ERROR, MISPLACED, heard=89.0)}
+    memory = site(grants={A: replace(GRANT, started=True)}, stations=known, robots=robots)
+    assert stations.in_time(memory, 90.0, SITE).grants[A].over is loses
+
+
 def test_a_robot_that_stays_away_is_given_up() -> None:
     memory = site(stations={A: shows(ASSIGNED, heard=69.0)})
     assert stations.in_time(memory, 69.9, SITE) == memory

@@ -205,6 +205,13 @@ def test_a_result_is_sent_once_for_each_request_of_rmf() -> None:
     assert cell.take(ASKS).report.results == accepted[:1]
 
 
+def test_a_failure_is_sent_at_once_and_not_only_when_rmf_repeats_its_request() -> None:
+    cell = running()
+    cell.memory = core.published(cell.memory, cell.report)
+    cell.take(Sampled(replace(CALM, fault=True)), MemoryKept(), at=11.0)
+    assert cell.report.results == (("task", WorkcellStatus.FAILED),)
+
+
 # ---- refused events, and decisions of a person
 
 
@@ -321,6 +328,7 @@ def test_requests_from_before_a_lost_memory_are_in_doubt_and_the_first_three_are
 def test_a_finished_guid_that_comes_again_with_other_items_or_after_silence_is_in_doubt() -> None:
     for again, silent_s, why in (
         (Item("jar", 2), 1.0, "asked for 2 jar under the guid of a request for 1 box (done)"),
+        (Item("jar", 2), 300.0, "asked for 2 jar under the guid of a request for 1 box (done)"),
         (BOX, 300.0, "done, and asked for again after RMF was silent for 300 s"),
     ):
         cell = running().take(Sampled(replace(CALM, done=True)), MemoryKept(), at=11.0)
@@ -424,7 +432,8 @@ def test_a_silence_that_rmf_ends_counts_no_more() -> None:
 
 @pytest.mark.parametrize("verdict", ["done", "failed", "again"])
 def test_a_request_that_a_person_decided_after_a_restart_is_forgotten_too(verdict: Any) -> None:
-    cell = restarted(running()).take(DecidedByPerson(verdict, ""), MemoryKept(), at=10.0)
+    cell = restarted(running()).take(DecidedByPerson(verdict, ""), at=10.0)
+    cell.take(MemoryKept(), MemoryKept())  # RMF does not repeat the request, so nothing starts
     assert cell.outputs == WorkcellOutputs()
     assert cell.take(Sampled(CALM), at=86_410.0).memory.jobs == ()
 

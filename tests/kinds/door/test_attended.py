@@ -2,7 +2,7 @@
 how long."""
 
 from bridges.kinds.shared.decision import Attended
-from tests.kinds.door.virtual import OBSTRUCTION, Door
+from tests.kinds.door.virtual import OBSTRUCTION, CoreAlone, Door
 
 
 def held(**limits: float) -> Door:
@@ -23,6 +23,15 @@ def test_by_default_a_door_stays_held_without_supervisor_and_robots() -> None:
     assert door.faults == [(0.0, ())]
 
 
+def test_with_supervisor_lost_s_a_door_stays_held_beside_its_supervisor() -> None:
+    door = Door(limits={"supervisor_lost_s": 60.0})
+    door.scan(Attended(True))
+    door.run(1.0)
+    door.opens()
+    door.run(200.0)
+    assert [on for _, on in door.relay] == [True]
+
+
 def test_with_supervisor_lost_s_the_hold_ends_after_that_time_and_a_fault_says_why() -> None:
     door = held(supervisor_lost_s=60.0)
     door.run(200.0)
@@ -37,6 +46,10 @@ def test_with_supervisor_lost_s_the_hold_ends_after_that_time_and_a_fault_says_w
     ]
     door.scan(Attended(True))
     assert door.faults[-1][1] == ()
+
+
+def test_no_word_about_the_supervisor_is_refused() -> None:
+    assert {CoreAlone().hears(Attended(yes)).refused for yes in (True, False)} == {""}
 
 
 def test_a_supervisor_that_returns_in_time_changes_nothing() -> None:

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from bridges.kinds.door.core import repeated
 from bridges.kinds.door.memory import DoorLimits
 from bridges.kinds.door.report import DoorReport
-from bridges.kinds.door.settings import DoorDurations, Pulse
+from bridges.kinds.door.settings import DoorDurations, DoorSettings, Pulse
 from bridges.kinds.door.signals import DoorOutputs, DoorSample, Event
 from bridges.kinds.shared.decision import (
     AlarmInputs,
@@ -36,6 +36,17 @@ from tests.kinds.door.virtual import (
 )
 
 ESTIMATED = DoorLimits(t=DoorDurations(open_delay_s=4.0, travel_s=6.0), estimated=True)
+
+
+def test_the_limits_are_those_of_the_file() -> None:
+    t, pulse, debounce = (
+        DoorDurations(open_delay_s=4.0),
+        Pulse(on_s=0.5, every_s=8.0),
+        {"opened": 0.1},
+    )
+    settings = DoorSettings(limits=t, feedback="estimated", on_fire="open", pulse=pulse)
+    assert DoorLimits.of(settings, debounce) == DoorLimits(t, debounce, True, "open", pulse)
+    assert DoorLimits.of(DoorSettings(), {}) == DoorLimits()
 
 
 # ---- DOOR-5: a door without a fresh reading

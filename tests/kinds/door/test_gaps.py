@@ -164,6 +164,18 @@ def test_an_obstruction_that_chatters_holds_a_door_that_closes() -> None:
     )
 
 
+def test_a_hazard_with_a_long_debounce_is_no_fault_before_it_counts() -> None:
+    """DOOR-SENSING-2: the debounce is longer than `hazard_clear_s`."""
+    core = CoreAlone(DoorLimits(DoorDurations(stale_after_s=60.0), debounce={"fire": 3.0}))
+    core.sees(replace(OPEN, fire=False), until=4.0)
+    told = []
+    for core.now in (5.0, 9.5, 10.0):
+        core.hears(Sampled(replace(OPEN, fire=True)))
+        core.hears(Sampled(replace(OPEN, fire=False)))
+        told.append([fault.split(":")[0] for fault in core.faults()])
+    assert told == [[], [], ["FIRE_ALARM", "HAZARD_INPUTS_UNSTEADY"]]
+
+
 def test_the_core_wakes_when_a_hazards_input_counts_as_restless() -> None:
     """DOOR-SENSING-2."""
     core = CoreAlone(DoorLimits(DoorDurations(stale_after_s=60.0), debounce={"fire": 0.5}))

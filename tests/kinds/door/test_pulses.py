@@ -4,6 +4,7 @@ it."""
 from collections.abc import Callable
 
 from bridges.kinds.door.memory import DoorLimits
+from bridges.kinds.door.pulses import DoorPulses, advance, changes_at
 from bridges.kinds.door.settings import DoorDurations, Pulse
 from bridges.kinds.door.signals import CloseRequested, DoorSample, OpenRequested
 from bridges.kinds.shared.decision import IoFailed, Sampled, WriteFailed
@@ -183,3 +184,17 @@ def test_a_new_hold_begins_with_a_pulse_of_its_own() -> None:
         (5.5, "MOVING", False),
         (8.0, "OPEN", False),
     ]
+
+
+def test_a_failure_in_the_scan_that_begins_a_pulse_counts() -> None:
+    """DOOR-PULSES-2."""
+    assert advance(None, True, 5.0, PULSE) == DoorPulses(5.0, failed_at=5.0)
+
+
+def test_between_pulses_that_follow_closely_the_relay_is_off_for_the_whole_time_between_them() -> (
+    None
+):
+    """DOOR-PULSES-1."""
+    close = Pulse(on_s=0.5, every_s=0.5625)
+    assert changes_at(DoorPulses(5.0), close) == 5.5
+    assert changes_at(DoorPulses(5.0, off_at=5.5), close) == 5.5625

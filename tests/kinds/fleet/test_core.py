@@ -12,7 +12,7 @@ from tests.kinds.fleet.story import PANTRY, SCAN_S, Story, at, driving, goal
 def test_a_robot_that_reports_completed_commands_is_done_at_its_goal() -> None:  # FLEET-2
     story = driving(7, completed="", moving=True)
     story.see(3.0, at=at(2.0)).see(at=at(4.6))
-    assert (story.report.activity, story.report.finished) == (7, 0)
+    assert (story.report.activity, story.report.finished, story.report.light) == (7, 0, None)
     story.see(at=at(4.9), completed="7", moving=False)
     assert story.commands == [(0.0, "navigate 7, attempt 1"), (3.0, "none")]
     assert (story.report.activity, story.report.finished, story.report.at) == (0, 7, at(4.9))
@@ -213,7 +213,7 @@ def test_a_stop_that_was_not_taken_is_sent_again_although_the_robot_stands() -> 
 
 
 def test_a_stop_is_sent_again_to_a_robot_that_is_not_read() -> None:  # FLEET-4
-    story = driving(7, moving=True).order(Stop(8, of=7)).silence(7.0)
+    story = driving(7, moving=True).order(Stop(8, of=7)).see().silence(7.0)
     assert story.commands[-1] == (6.0, "stop 8, attempt 3")
 
 
@@ -240,7 +240,7 @@ def test_a_reset_begins_the_attempts_of_an_action_anew() -> None:  # FLEET-12
     sent = story.see(refused="").commands
     assert not story.report.fit
     story.take(OperatorReset())
-    assert (story.report.fit, story.commands) == (True, sent)
+    assert (story.report.fit, story.memory.tries, story.commands) == (True, 1, sent)
 
 
 def test_a_stop_without_a_word_about_motion_is_believed_after_a_second_of_standing() -> None:

@@ -161,6 +161,12 @@ def test_a_stop_is_not_believed_while_the_robot_turns_on_the_spot() -> None:
     assert still.see(0.25).memory.command is None
 
 
+def test_a_robot_that_has_turned_stands_a_second_later() -> None:  # FLEET-SENSING-3
+    still = driving(7).order(Stop(8, of=7)).see(at=at(0.0, yaw=0.5)).see(0.875)
+    assert still.memory.command is not None
+    assert still.see(0.125).memory.command is None
+
+
 def test_a_robot_that_creeps_is_measured_from_the_place_where_it_began_to_stand() -> None:
     """FLEET-SENSING-3: a robot that moves in steps of 2 cm does not stand."""
     story = driving(7)

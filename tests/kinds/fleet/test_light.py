@@ -253,7 +253,8 @@ def test_a_robot_that_a_person_has_paused_is_not_resumed() -> None:  # FLEET-LIG
     says(story, "continue", 0).see(at=at(1.5), moving=False, paused=True)
     says(story, "resume", 0).see(60.0)
     assert story.memory.command is None
-    assert story.faults == ["ROBOT_PAUSED_BY_OTHERS"]
+    text = "somebody else paused it first, and we resume only our own pauses"
+    assert story.report.faults == (Fault("ROBOT_PAUSED_BY_OTHERS", text),)
     says(story, "stay", 0).see(5.0)
     assert story.memory.command is None, "it is paused already"
     story.take(OperatorReset())
@@ -340,6 +341,7 @@ def test_its_doing_names_path_checkpoint_light_and_pause() -> None:
 
 def test_a_robot_that_drives_without_a_path_is_told() -> None:
     story = standing(path=(), moving=True)
-    assert story.faults == ["ROBOT_WITHOUT_PATH"]
+    text = "it drives, and its manager tells no path"
+    assert story.report.faults == (Fault("ROBOT_WITHOUT_PATH", text),)
     assert (story.memory.command, story.report.doing) == (None, "nothing")
     assert standing(path=()).faults == []

@@ -109,6 +109,19 @@ def test_agv_mode_that_ends_on_the_way_is_a_fault_and_is_requested_by_a_new_call
     assert story.outputs.call == "L3"
 
 
+def test_agv_mode_that_ends_on_the_way_after_the_pulse_of_the_call_is_a_fault_too() -> None:
+    building = Building(replace(STANDING, agv=False))
+    story = Story(building, agv_mode="by_call", call_pulse_s=0.5)
+    story.run(1.0)
+    story.asks(A, "L3")
+    building.set(agv=True, motion=Motion.UP, level=None)
+    story.run(5.0)
+    assert (story.outputs, story.faults) == (LiftOutputs(agv_request=True), [])
+    building.set(agv=False)
+    story.run(6.0)
+    assert story.faults == ["AGV_MODE_LOST"]
+
+
 def test_agv_mode_may_end_between_two_destinations() -> None:
     building, story = called()
     building.set(level=None, motion=Motion.UP)

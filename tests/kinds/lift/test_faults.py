@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from bridges.kinds.lift.memory import Doubted
 from bridges.kinds.lift.signals import (
     DoorReading,
     Hazard,
@@ -124,6 +125,16 @@ def test_a_request_that_waits_is_explained_by_its_mode_or_by_the_faults_that_hin
     codes = [fault.code for fault in lift.faults]
     assert codes == ["CODE_BLUE", "OUT_OF_SERVICE", "FORGOTTEN_BY_SUPERVISOR"]
     assert lift.decision.report.waits == "for the end of CODE_BLUE, OUT_OF_SERVICE"
+
+
+def test_a_request_that_was_not_repeated_or_may_be_old_says_for_which_request_it_waits() -> None:
+    lift = Alone(request_timeout_s=10.0)(0.0, CLOSED)(5.0, CLOSED, LiftRequested("A", True, "L3"))
+    assert lift(15.0, CLOSED).decision.report.waits == "for a request of A"
+    lift = Alone()(0.0, AT_L1)(5.0, AT_L1, ASKED)(5.5, AT_L1)
+    session = replace(lift.memory.session, doubted=Doubted("L3", 5.5))  # type: ignore[type-var]
+    lift.memory = replace(lift.memory, session=session)
+    why = "for the robot itself to ask for L3: the request may be from an earlier ride"
+    assert lift(5.6, AT_L1).decision.report.waits == why
 
 
 def test_a_request_waits_for_the_car_until_it_stands_and_for_nothing_once_it_is_open() -> None:

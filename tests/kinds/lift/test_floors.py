@@ -13,7 +13,7 @@ from bridges.kinds.lift.signals import (
 from bridges.kinds.shared.decision import (
     OperatorReset,
 )
-from tests.kinds.lift.alone import AT_L1, Alone
+from tests.kinds.lift.alone import AT_L1, CLOSED, Alone
 from tests.kinds.lift.story import OPEN_AT_L1, Building, Controller, Story, boarding
 
 # ---- LIFT-SENSING-3: a floor that the car cannot have reached
@@ -79,6 +79,18 @@ def test_a_doubted_floor_is_believed_after_the_car_has_gone_there() -> None:
     story.building.set(level="L3", motion=Motion.STOPPED)
     story.run(9.0)
     assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
+
+
+def test_a_doubted_floor_is_believed_after_a_ride_over_other_floors() -> None:
+    story = boarding()
+    story.building.set(level="L4")
+    story.run(3.0)
+    assert story.faults == ["POSITION_LOST"]
+    story.building.set(motion=Motion.UP)
+    for level in (None, "L2", "L3", "L4"):
+        story.building.set(level=level)
+        story.run(story.now + 3.0)
+    assert (story.state, story.faults) == ("AGV, moving at L4, A to L1", [])
 
 
 def test_a_rejected_floor_is_believed_after_the_car_has_gone_there() -> None:
@@ -175,6 +187,15 @@ def test_a_car_may_pass_a_floor_unseen_in_its_least_travel_time() -> None:
     alone = Alone(stale_after_s=60.0, floor_travel_min_s=2.0)(0.0, moving)
     alone(2.0, replace(moving, level="L3"))
     assert (alone.decision.report.floor, alone.faults) == ("L3", ())
+
+
+def test_the_travel_is_timed_from_a_floor_that_only_one_reading_showed() -> None:
+    alone = Alone(floor_travel_min_s=1.0)(0.0, CLOSED)
+    between = replace(CLOSED, level=None, motion=Motion.UP)
+    alone(0.5, between)(5.0, between)(9.0, replace(between, level="L2"))(9.5, between)
+    alone(11.0, replace(between, level="L1"))(11.5, between)
+    alone(11.9, replace(between, level="L3"))
+    assert [fault.code for fault in alone.faults] == ["POSITION_LOST"]
 
 
 def test_a_floor_that_is_passed_within_its_debounce_does_not_lose_the_car() -> None:

@@ -1,6 +1,8 @@
 """Relays that must not be on together, relays that must stay off for some time, and switching off at
 once."""
 
+from typing import Any
+
 import pytest
 from msgspec.structs import replace
 
@@ -258,6 +260,16 @@ def test_a_lift_that_waits_for_a_worn_relay_says_so() -> None:
         (5.5, "for the call: its relay must rest", rests),
         (62.0, "for the car at L4"),
     ]
+
+
+def test_a_relay_that_must_rest_is_named() -> None:
+    t, on, off = LiftDurations(), Channel(True, ons=(0.0,)), Channel[Any](off_at=10.0)
+    wants = LiftOutputs(agv_request=True, call="L1"), LiftOutputs(True, hold_door=Side.FRONT)
+    assert [
+        Relays(agv=off).resting(wants[0], 10.0, t),
+        Relays(on, call=off).resting(wants[0], 10.0, t),
+        Relays(on, hold=off).resting(wants[1], 10.0, t),
+    ] == [("AGV mode", False), ("the call", False), ("the door", False)]
 
 
 # ---- LIFT-DRIVE-4: pulses

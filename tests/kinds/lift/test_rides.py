@@ -243,6 +243,12 @@ def test_an_open_door_in_human_mode_is_not_offered_for_boarding() -> None:
     story = Story(Building(at("L1", DoorReading.OPEN, agv=False)))
     story.run(1.0)
     assert story.state == "HUMAN, open at L1"
+    story.building.set(agv=True)
+    story.asks("A", "L1", HUMAN)
+    story.run(2.0)
+    assert story.state == "AGV, moving at L1, A to L1"
+    story = Story(Building(at("L1", DoorReading.OPEN, agv=False)))
+    story.run(1.0)
     story.asks("A", "L1", HUMAN)
     story.run(3.0)
     assert story.state == "HUMAN, moving at L1, A to L1"

@@ -364,6 +364,33 @@ def test_a_floor_code_that_keeps_changing_in_a_standing_car_is_not_believed() ->
     assert story.outputs == LiftOutputs()
 
 
+def test_after_the_car_has_stopped_its_floor_code_has_its_debounce_and_2_s_to_settle() -> None:
+    """LIFT-SENSING-1."""
+    story = riding_past_a_floor_in_each_reading()
+    story.building.set(motion=Motion.STOPPED)
+    stopped_at = story.now
+    seen = []
+    for n in range(7):
+        story.building.set(level=("L8", "L9")[n % 2])
+        story.run(stopped_at + 0.5 * (n + 1))
+        seen.append(story.state.partition(",")[0])
+    assert seen == [*["AGV"] * 6, "OFFLINE"]
+
+
+def test_a_door_contact_that_chatters_on_the_way_takes_every_input() -> None:
+    """LIFT-SENSING-1: only a floor code may keep changing in a car that moves."""
+    closed = replace(OPEN_AT_L1, door=DoorReading.CLOSED)
+    story = Story(Building(closed))
+    story.run(1.0)
+    story.asks("A", "L3")
+    story.building.set(motion=Motion.UP, level=None)
+    for n in range(150):
+        story.building.set(door=(DoorReading.BETWEEN, DoorReading.CLOSED)[n % 2])
+        story.run(1.0 + 0.02 * (n + 1))
+        story._scan()
+    assert (story.state, story.outputs) == ("OFFLINE, moving at ?, A to L3", LiftOutputs())
+
+
 def test_a_fire_loop_that_chatters_takes_the_lift_away() -> None:
     story = boarding()
     for i in range(100):

@@ -150,6 +150,27 @@ def test_a_claim_for_a_floor_that_is_not_served_blocks_nobody() -> None:
     assert desk.waiting == []
 
 
+def test_the_end_of_a_claim_for_a_floor_that_is_not_served_is_no_persons() -> None:
+    desk = Alone()
+    desk.asks("a", "L9")
+    desk.shows(floors=("L1", "L3"))
+    desk.until(1.0)
+    desk.asks("a", "L9")
+    end = core.wanted(desk.memory)
+    assert end is not None
+    assert (end.request_type, end.door_state) == (core.END, 0)
+
+
+def test_a_robot_that_waits_for_a_served_floor_stays_in_the_queue_after_a_wrong_request() -> None:
+    desk = Alone()
+    desk.asks("b")
+    desk.asks("a", "L1")
+    desk.shows("b", "L3", to="L3", open=True, floors=("L1", "L3"))
+    desk.until(1.0)
+    desk.asks("a", "L9")
+    assert (desk.waiting, desk.sent) == (["a"], [(0.0, "AGV b L3")])
+
+
 def test_a_waiting_claim_for_a_floor_that_is_no_longer_served_leaves_the_queue() -> None:
     desk = Alone()
     desk.asks("b")

@@ -127,7 +127,7 @@ def test_a_session_keeps_its_turn_if_only_other_topics_have_another_publisher() 
     desk.asks("a")
     desk.until(1.0)
     desk.hears(MaySpeak(True, alone=False))
-    assert desk.report.holder == "a"
+    assert (desk.report.holder, desk.report.since) == ("a", 0.0)
 
 
 def test_the_lifts_node_is_told_that_a_person_has_ended_the_session() -> None:
@@ -147,17 +147,19 @@ def test_the_lifts_node_is_told_that_a_person_has_ended_the_session() -> None:
 
 
 def test_a_person_ends_a_session_whose_end_the_lift_does_not_obey() -> None:
-    """The lift keeps a robot in the car that goes on asking. Only a person's END ends that session."""
+    """The lift keeps a robot in the car that goes on asking. Only a person's END ends that session. A
+    repeated END does not put off the fault END_NOT_OBEYED."""
     desk = Alone()
     desk.asks("a")
     desk.ride("a")
     desk.until(1.0)
-    for by_person, door in ((False, 0), (True, 2), (False, 2)):
+    ends = ((False, 0, 2.0), (False, 0, 2.0), (True, 2, 4.0), (False, 2, 4.0), (True, 2, 4.0))
+    for by_person, door, since in ends:
         desk.until(desk.now + 1.0)
         desk.hears(RideEnded("a", desk.stamped(0.0), -desk.skew, by_person=by_person))
         end = core.wanted(desk.memory)
         assert end is not None
-        assert end.door_state == door
+        assert (end.door_state, desk.report.since) == (door, since)
 
 
 def test_beside_another_supervisor_ours_is_silent_and_afterwards_follows_the_shown_state() -> None:
@@ -243,6 +245,8 @@ def test_the_report_names_the_holder_and_each_waiting_robot_with_its_time() -> N
     assert desk.report == SupervisorReport(None)
     desk.until(1.0)
     desk.asks("a")
+    desk.shows("a")
+    assert desk.report == SupervisorReport(1.0, "a", "a", 1.0)
     desk.until(2.0)
     desk.asks("b")
     desk.shows("a")

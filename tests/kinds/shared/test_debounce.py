@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridges.kinds.shared.debounce import Settled, forget, settle
+from bridges.kinds.shared.debounce import Settled, fear, forget, settle
 
 HOLD_S = 0.05
 
@@ -64,6 +64,18 @@ def test_after_a_gap_the_believed_value_stays_and_a_new_value_starts_again() -> 
     again = settle(forget(settle(None, 1, 0.0, HOLD_S)), 1, 5.0, HOLD_S)
     assert again == Settled(None, 1, 5.0, torn_since=0.0), "it has kept changing since its start"
     assert forget(None) is None
+
+
+def test_a_hazard_counts_at_any_reading_after_its_input_has_kept_changing() -> None:
+    """After 2 s on top of the debounce. If the input has never settled, only at a reading that shows
+    the hazard."""
+    torn = Settled(False, False, 4.9, steady_at=1.0, torn_since=2.0)
+    assert fear(torn, 4.5, 1.0) == torn
+    assert fear(torn, 5.0, 1.0) == Settled(True, False, 4.9, steady_at=5.0, torn_since=2.0)
+    new = Settled(None, True, 4.9, torn_since=2.0)
+    assert fear(new, 5.0, 1.0) == Settled(True, True, 4.9, steady_at=5.0, torn_since=2.0)
+    calm = Settled(None, False, 4.9, torn_since=2.0)
+    assert fear(calm, 5.0, 1.0) == calm
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 0.1), st.booleans()), min_size=1, max_size=60))

@@ -5,7 +5,13 @@ from typing import Any
 from msgspec.structs import replace
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
-from bridges.kinds.shared.decision import AlarmInputs, Decision, Fault, OperatorReset
+from bridges.kinds.shared.decision import (
+    AlarmInputs,
+    Decision,
+    DrillOrdered,
+    Fault,
+    OperatorReset,
+)
 from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 from bridges.kinds.shared.fleet_alarm import MOST_OTHERS
 from bridges.kinds.shared.fleet_alarm_memory import (
@@ -19,7 +25,7 @@ from bridges.kinds.shared.fleet_alarm_memory import (
     FleetAlarmReport,
 )
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
-from bridges.messages.definitions import EmergencySignal
+from bridges.messages.definitions import Bool, EmergencySignal
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
 from tests.kinds.shared.fleets import graph
 
@@ -196,6 +202,17 @@ def test_a_contradicted_alarm_wakes_for_its_next_word_and_for_the_end_of_its_fau
     assert ([fault.code for fault in over.report.faults], over.wake_at) == (["ALARM_RAISED"], NEVER)
 
 
+def test_a_drill_ends_at_its_wake_up() -> None:
+    """FLEET-ALARM-7."""
+    drill = after(DrillOrdered(60.0))
+    over = after(Woken(), memory=drill.memory, now=drill.wake_at)
+    assert (drill.wake_at, over.report.state) == (70.0, "quiet")
+    assert over.publish == ((FIRE_ALARM_TRIGGER, Bool(False)),)
+    assert after(DrillOrdered(0.0)).refused == ""
+    refused = after(FIRE, AlarmHeard(fleets("b"), True), DrillOrdered(60.0)).refused
+    assert refused == "no drill during an alarm: fire of Panel, b"
+
+
 def test_an_end_notes_its_time_so_that_its_retained_false_stays_a_while() -> None:
     made = after(FIRE, CALM, OperatorReset(), now=42.0)
     assert (made.memory.ended_at, made.memory.told, made.memory.owed) == (42.0, None, False)
@@ -217,6 +234,8 @@ def test_every_fault_and_report_says_what_a_person_must_know() -> None:
     against = after(AlarmHeard(fleets("desk", "c"), False), memory=raised.memory).report
     text = "c or desk publishes false, while this daemon publishes true"
     assert against.faults == (Fault("ALARM_CONTRADICTED", text), fault)
+    quiet = after(AlarmHeard(fleets("b"), True)).report
+    assert (quiet.waits, quiet.faults) == ((), ())
     drill = Fault("ALARM_DRILL", "the robots are stopped for a drill, which ends by itself")
     assert after(DRILL).report == FleetAlarmReport("drill", (), (), (drill,), 10.0)
     heard = [AlarmHeard(fleets(name), True) for name in "cb"]
