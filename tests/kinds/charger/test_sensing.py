@@ -122,6 +122,8 @@ def test_a_bounce_of_the_first_readings_after_a_silence_does_not_count() -> None
     """A station that was unreachable may have changed, so no earlier reading counts either."""
     it = charging()
     it.all([SILENT] * 3)
+    it.shows(charging=True, lasts=0.002)
+    assert it.state == ("ERROR", "Charger unreachable")
     it.shows(charging=False, lasts=0.002).shows(charging=True, lasts=1.0)
     assert [line[1:] for line in it.told[-2:]] == [
         ("ERROR", "Charger unreachable"),

@@ -183,6 +183,14 @@ def test_after_three_failed_commands_the_stop_has_its_whole_time_again() -> None
     assert it.sees((A.CHARGING, ONE, 1)).memory.protection != ""
 
 
+def test_after_an_outage_the_stop_has_its_whole_time_again() -> None:
+    it = docked().event(CANCEL_1).sees((A.CHARGING, ONE, 20)).polls("silent 3")
+    it.sees((A.CHARGING, ONE, 30))
+    assert it.memory.protection == ""
+    it.sees((A.CHARGING, ONE, 2))
+    assert it.memory.protection != ""
+
+
 @pytest.mark.parametrize("asked", [True, False])
 def test_a_station_whose_stop_was_never_written_stays_in_service(asked: bool) -> None:
     it = docked().event(CANCEL_1) if asked else story()

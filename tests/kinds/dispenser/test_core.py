@@ -272,8 +272,10 @@ def test_a_memory_of_an_earlier_version_has_no_silence() -> None:
 
 def test_one_request_twice_in_the_memory_is_refused() -> None:
     twice = WorkcellMemory(jobs=(Job("a", kept="queued"), Job("a", kept="queued")))
-    with pytest.raises(ValueError, match="one request is in the memory twice"):
+    with pytest.raises(ValueError, match=r"^one request is in the memory twice$"):
         restore(persist(twice), 0.0)
+    with pytest.raises(ValueError, match=r"^not the memory of a dispenser or ingestor: "):
+        restore(b"[]", 0.0)
 
 
 # ---- what people and RMF are told
@@ -432,7 +434,7 @@ def test_a_silence_that_rmf_ends_counts_no_more() -> None:
 
 @pytest.mark.parametrize("verdict", ["done", "failed", "again"])
 def test_a_request_that_a_person_decided_after_a_restart_is_forgotten_too(verdict: Any) -> None:
-    cell = restarted(running()).take(DecidedByPerson(verdict, ""), at=10.0)
+    cell = restarted(running()).take(DecidedByPerson(verdict, ""), Sampled(CALM), at=10.0)
     cell.take(MemoryKept(), MemoryKept())  # RMF does not repeat the request, so nothing starts
     assert cell.outputs == WorkcellOutputs()
     assert cell.take(Sampled(CALM), at=86_410.0).memory.jobs == ()

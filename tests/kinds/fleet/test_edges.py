@@ -162,7 +162,9 @@ def test_a_stop_is_not_believed_while_the_robot_turns_on_the_spot() -> None:
 
 
 def test_a_robot_that_has_turned_stands_a_second_later() -> None:  # FLEET-SENSING-3
-    still = driving(7).order(Stop(8, of=7)).see(at=at(0.0, yaw=0.5)).see(0.875)
+    still = driving(7).order(Stop(8, of=7)).see(at=at(0.0, yaw=0.5))
+    still.now += 0.125
+    still.see(0.75)
     assert still.memory.command is not None
     assert still.see(0.125).memory.command is None
 
@@ -260,6 +262,12 @@ def test_a_site_without_a_graph_knows_every_map() -> None:  # FLEET-6
     story = Story(limits=RobotLimits())
     assert story.see(at=Pose("anything", 0.0, 0.0)).faults == []
     assert story.report.at == Pose("anything", 0.0, 0.0)
+
+
+def test_the_age_of_a_reading_is_no_news_and_the_end_of_a_command_is() -> None:
+    before = driving(7, completed="").see().report
+    assert replace(before, read_at=0.0).news() == before.news()
+    assert replace(before, finished=7).news() != before.news()
 
 
 def test_the_limits_are_those_of_the_file() -> None:

@@ -81,16 +81,15 @@ def test_a_doubted_floor_is_believed_after_the_car_has_gone_there() -> None:
     assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
 
 
-def test_a_doubted_floor_is_believed_after_a_ride_over_other_floors() -> None:
-    story = boarding()
-    story.building.set(level="L4")
-    story.run(3.0)
-    assert story.faults == ["POSITION_LOST"]
-    story.building.set(motion=Motion.UP)
-    for level in (None, "L2", "L3", "L4"):
-        story.building.set(level=level)
-        story.run(story.now + 3.0)
-    assert (story.state, story.faults) == ("AGV, moving at L4, A to L1", [])
+def test_a_doubted_floor_is_believed_after_a_ride_over_a_floor_that_only_one_reading_showed() -> (
+    None
+):
+    alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))
+    assert [fault.code for fault in alone.faults] == ["POSITION_LOST"]
+    moving = replace(AT_L1, motion=Motion.UP)
+    for now, level in ((1.0, None), (2.0, "L2"), (3.0, None), (4.0, "L3")):
+        alone(now, replace(moving, level=level))
+    assert (alone.decision.report.floor, alone.faults) == ("L3", ())
 
 
 def test_a_rejected_floor_is_believed_after_the_car_has_gone_there() -> None:

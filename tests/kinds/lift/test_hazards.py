@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from bridges.kinds.lift import keep
 from bridges.kinds.lift.settings import LiftSettings
 from bridges.kinds.lift.signals import (
     DoorReading,
@@ -418,6 +419,11 @@ def test_a_lift_whose_memory_is_damaged_waits_for_a_reset_and_a_new_lift_does_no
     story.restart()
     story.run(2.0)
     assert story.faults == faults
+
+
+def test_bytes_that_are_no_memory_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"^not the memory of a lift: "):
+        keep.restore(b"[]", 0.0)
 
 
 def test_a_full_disk_delays_no_output_and_is_a_fault_only_where_a_latch_matters() -> None:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
@@ -67,6 +68,11 @@ def restarted(made: Made) -> FleetAlarmMemory:
 
 
 # ---- restarts
+
+
+def test_bytes_that_are_no_memory_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"^not an alarm's memory: "):
+        kept_alarm.restore(b"[]")
 
 
 def test_a_cause_that_is_over_but_was_not_reset_still_latches_after_a_restart() -> None:
