@@ -2,12 +2,14 @@
 test."""
 
 import re
+from typing import get_args
 
 import pytest
 
 from bridges.kinds.charger.signals import ChargerOutputs
 from bridges.kinds.dispenser.signals import WorkcellOutputs
 from bridges.kinds.door.signals import DoorOutputs
+from bridges.kinds.fleet.signals import Doing
 from bridges.kinds.lift.signals import LiftOutputs
 from tests.reference.hazards import PAGE, ROOT, UnsafeAction, actions, page
 
@@ -32,8 +34,10 @@ ORDERS = {
     "coordinator.cancel",
     "coordinator.assignment",
     "alarm.fleets",
+    *(f"robot.{doing}" for doing in get_args(Doing)),
 }
-"""The messages by which a supervisor, the coordinator or an alarm orders a device or robots."""
+"""The messages by which a supervisor, the coordinator or an alarm orders a device or robots, and our
+orders to a robot."""
 
 
 def test_every_output_of_every_kind_and_every_order_has_its_four_rows() -> None:

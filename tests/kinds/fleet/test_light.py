@@ -89,11 +89,12 @@ def test_the_path_is_over_at_its_last_checkpoint() -> None:  # FLEET-LIGHT-1
     story = started()
     for checkpoint, x in enumerate((3.0, 6.0)):
         says(story, "continue", checkpoint).see(at=at(x))
+    sent = story.commands
     says(story, "wait", 2).see(at=at(8.0)).see(at=at(9.0), moving=False)
     assert story.report.light == LightQuestion(
         (), 1, 0, "at", SITE.on_rmfs_map(at(9.0)), held=False
     )
-    assert story.commands[-1][1] == "none"
+    assert (story.commands, story.commands[-1][1]) == (sent, "none")
 
 
 def test_a_path_over_a_lift_goes_on_at_the_other_floor() -> None:
