@@ -132,12 +132,13 @@ def _answer(
     who, said, found = label(robot.who), robot.said, Answer()
     if not said.is_current(clock.now.at):
         for_s = lasted(clock.now.at - said.last.at)
-        return found.say(
+        found.say(
             f"The last report on {who} came at {clock.time(said.last.wall)}, {for_s} ago: its daemon is"
             " not running, or is cut off.",
             "a person",
             "run `rmf-bridge status` on the machine of the fleet's daemon",
         )
+        return _served(found, who, {**waits, **has}, queued)
     say_stands(found, robot, clock, remedies)
     _served(found, who, waits, queued)
     _of_daemon(found, robot, remedies)

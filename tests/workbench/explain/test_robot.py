@@ -134,6 +134,14 @@ def test_a_silent_daemon_is_told_before_all_else() -> None:
     assert "20 s ago: its daemon is not running, or is cut off." in found.now[0]
 
 
+def test_a_robot_whose_daemon_is_silent_is_also_explained_by_the_lift_that_it_waits_for() -> None:
+    heard = [one for at in range(12, 30) for one in lift(float(at))]
+    found = explained(reported(10.0, doing="navigate to L1 lift1_L1"), *heard, until=29.5)
+    assert found.now[0].startswith("The last report on tiny/AMR01 came at ")
+    assert found.now[1].startswith("tiny/AMR01 has waited since")
+    assert found.next[0].what == "run `rmf-bridge status` on the machine of the fleet's daemon"
+
+
 def test_a_fleet_without_rmf_is_told() -> None:
     found = explained(reported(10.0, joined=False))
     assert found.now == ("No RMF directs tiny/AMR01: no schedule node.",)
