@@ -1,4 +1,5 @@
-"""A bus's backoff after failures. The pause doubles from 0.5 to 30 s, and the first success ends it."""
+"""A bus's backoff after failures. The pause doubles from 0.5 s to a longest pause, and the first
+success ends it."""
 
 import math
 from collections.abc import Callable
@@ -14,11 +15,18 @@ at the same moment."""
 
 
 class Backoff:
-    """The pauses after failures. `jitter()` returns a random number between 0 and 1."""
+    """The pauses after failures. `jitter()` returns a random number between 0 and 1. `most_s`: the
+    longest pause (s)."""
 
-    def __init__(self, clock: Callable[[], float], jitter: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        jitter: Callable[[], float],
+        most_s: float = BACKOFF_MAX_S,
+    ) -> None:
         self._clock = clock
         self._jitter = jitter
+        self._most_s = most_s
         self._pause_s = 0.0
         self._retry_at = -math.inf
         self._failure = ""
@@ -52,7 +60,7 @@ class Backoff:
         """Begin a pause that is twice as long as the last pause. Return the HalError for the caller to
         raise."""
         self._failure = text
-        self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
+        self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), self._most_s)
         self._retry_at = self._clock() + self._pause_s * (1 - JITTER * self._jitter())
         return HalError(text)
 

@@ -13,11 +13,12 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from itertools import chain
+from typing import TYPE_CHECKING, TypeVar
 
 from bridges.system import user_files
 from drivers.hal import Bus, BusType, HalError
-from drivers.hal.backoff import Backoff
+from drivers.hal.backoff import BACKOFF_MAX_S, Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
 from drivers.hal.http_json import WrongAnswer, excerpt, json_object
@@ -32,9 +33,13 @@ if TYPE_CHECKING:
 
     from drivers.hal.http_push import Pushes
 
+K = TypeVar("K")
+
 BODY_MAX = 64 * 1024
-WRONG_MAX = 256
-"""The maximum number of paths for which the bus remembers a wrong answer."""
+REMEMBERED_MAX = 256
+"""The maximum number of wrong answers, and of lost commands, that the bus remembers."""
+OFF_PAUSE_MAX_S = 3.0
+"""The longest pause (s) of an off whose answer is lost while readings succeed."""
 HEADERS = {
     "Accept": "application/json",
     "Accept-Encoding": "identity",
@@ -69,6 +74,7 @@ class HttpBus(Bus):
         self._adapter = _adapter(self._dialler, self._base.scheme)
         self._backoff, self._safe_backoff = (Backoff(clock, lambda: 0.0) for _ in range(2))
         self._wrong: dict[str, Backoff] = {}
+        self._offs: dict[tuple[str, str | None], Backoff] = {}
         self._signer = Signer(settings.login) if settings.login else None
         self._pushes: Pushes | None = None
 
@@ -105,7 +111,7 @@ class HttpBus(Bus):
         switches an output off. Such a command does not wait for the backoff of a failed reading.
         """
         url = self._base.url(path)
-        with self._attempt(self._safe_backoff if safe else self._backoff, path):
+        with self._attempt(self._off(path, body) if safe else self._backoff, path):
             self._call(method, url, body)
 
     def ask(
@@ -114,12 +120,21 @@ class HttpBus(Bus):
         """Send a command as `send` does. Return the JSON object of its answer, which must have status
         200."""
         url = self._base.url(path)
-        with self._attempt(self._safe_backoff if safe else self._backoff, path):
+        with self._attempt(self._off(path, body) if safe else self._backoff, path):
             return json_object(url, *self._call(method, url, body, reads=True))
+
+    def _off(self, path: str, body: str | None) -> Backoff:
+        """Return the backoff of a command that switches off. While readings succeed, a lost answer
+        delays only the same command, because the others may be for other devices. While readings
+        fail, the controller may be gone, and one backoff is for all."""
+        if self._backoff.failing:
+            return self._safe_backoff
+        return _remember(self._offs, (path, body), self._clock, OFF_PAUSE_MAX_S)
 
     def insist(self) -> None:
         """Let the next call skip the backoff."""
-        for backoff in (self._backoff, self._safe_backoff, *self._wrong.values()):
+        one_each = self._wrong.values(), self._offs.values()
+        for backoff in (self._backoff, self._safe_backoff, *chain(*one_each)):
             backoff.insist()
 
     def close(self) -> None:
@@ -142,9 +157,7 @@ class HttpBus(Bus):
             yield
             failed = False
         except WrongAnswer as error:
-            if wrong is None and len(self._wrong) >= WRONG_MAX:
-                del self._wrong[next(iter(self._wrong))]
-            self._wrong.setdefault(path, Backoff(self._clock, lambda: 0.0)).failed(str(error))
+            _remember(self._wrong, path, self._clock).failed(str(error))
             backoff.mended()
             raise
         except HalError as error:
@@ -228,6 +241,15 @@ class HttpBus(Bus):
         if reason := _tls_failure(error, self._settings.ca_file):
             return HalError(f"TLS with {where} fails: {reason}: check ca_file and api_base")
         return HalError(f"{url}: no complete HTTP answer ({_cause(error)}): is it an HTTP server?")
+
+
+def _remember(
+    table: dict[K, Backoff], key: K, clock: Callable[[], float], most_s: float = BACKOFF_MAX_S
+) -> Backoff:
+    """Return the backoff of this key. A full table forgets the key that came first."""
+    if key not in table and len(table) >= REMEMBERED_MAX:
+        del table[next(iter(table))]
+    return table.setdefault(key, Backoff(clock, lambda: 0.0, most_s))
 
 
 def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":

@@ -563,7 +563,7 @@ def test_a_wrong_answer_delays_only_its_own_path() -> None:
 def test_a_refused_command_delays_no_reading_and_few_paths_are_remembered(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("drivers.hal.http.WRONG_MAX", 2)
+    monkeypatch.setattr("drivers.hal.http.REMEMBERED_MAX", 2)
     with FarEnd(always(answer(status="500 No"))) as far:
         bus = bus_to(far.port, clock=lambda: 0.0)
         for number in (1, 2, 3, 3, 2):
@@ -575,6 +575,35 @@ def test_a_refused_command_delays_no_reading_and_few_paths_are_remembered(
         assert far.connections == 4
         far.conversations = [always(answer())]
         assert bus.get_json("/state") == {"state": 0}
+        bus.close()
+
+
+def test_an_off_whose_answer_is_lost_delays_no_other_off_while_readings_succeed() -> None:
+    now = [0.0]
+    with FarEnd(once(answer()), once(b"?"), always(answer())) as far:
+        bus = bus_to(far.port, clock=lambda: now[0])
+        assert bus.get_json("/state") == {"state": 0}
+        with pytest.raises(HalError, match="no complete HTTP answer"):
+            bus.send("/stop", body='{"robot": 1}', safe=True)
+        bus.send("/stop", body='{"robot": 2}', safe=True)
+        with pytest.raises(HalError, match="no complete HTTP answer"):
+            bus.send("/stop", body='{"robot": 1}', safe=True)
+        assert far.connections == 3
+        now[0] += 0.5
+        bus.send("/stop", body='{"robot": 1}', safe=True)
+        bus.close()
+
+
+def test_while_readings_fail_a_lost_off_delays_every_other_off() -> None:
+    """The controller may be gone, and each attempt lasts as long as the timeout."""
+    with FarEnd(once(b"?")) as far:
+        bus = bus_to(far.port, clock=lambda: 0.0)
+        with pytest.raises(HalError):
+            bus.get_json("/state")
+        for number in (1, 2, 3):
+            with pytest.raises(HalError, match="no complete HTTP answer"):
+                bus.send(f"/stop/{number}", safe=True)
+        assert far.connections == 2
         bus.close()
 
 
