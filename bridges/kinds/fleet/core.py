@@ -34,8 +34,10 @@ FLEET-10. A robot gets no new task while it reports a fault, takes no orders, is
    gets tasks again.
 FLEET-11. If RMF has given up an activity, the activity is stopped.
 FLEET-12. After an operator's reset, the attempts are counted from the beginning, and the command is
-   sent again. An action is sent again only if it was refused, if it has failed, or if nobody knows
-   whether it has begun.
+   sent again, but not while a person may be keeping the robot standing (FLEET-3). An action is sent
+   again only if it was refused, if it has failed, or if nobody knows whether it has begun.
+FLEET-13. A command that could not be sent is a fault, and is tried again at each scan. It does not
+   concern the robot's place, which RMF still gets.
 
 `light.py` has the rules for a robot that RMF can only pause.
 """
@@ -58,9 +60,10 @@ from bridges.kinds.fleet.signals import (
     PadHeard,
     RobotCommand,
     RobotOutputs,
+    RobotSample,
     Stop,
 )
-from bridges.kinds.shared.decision import Decision, IoFailed, OperatorReset, Sampled
+from bridges.kinds.shared.decision import Decision, IoFailed, OperatorReset, Sampled, WriteFailed
 from bridges.kinds.shared.durations import NEVER
 
 MOST_PAUSES = 6
@@ -99,7 +102,9 @@ def decide(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) -
 def _hear(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) -> RobotMemory:
     match event:
         case Sampled(sample):
-            return take(memory, sample, now, limits)
+            return _sent(take(memory, sample, now, limits))
+        case WriteFailed(reason):
+            return replace(memory, unsent=reason)
         case IoFailed(reason):
             return replace(memory, fresh=False, unread=reason)
         case PadHeard(charger=charger):
@@ -115,16 +120,39 @@ def _hear(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) ->
     return memory
 
 
+def _sent(memory: RobotMemory) -> RobotMemory:
+    """Forget why a command was not sent, once the robot or its manager has answered it."""
+    command, reading = memory.command, memory.reading
+    if not memory.unsent or (command and reading and not _is_answered(reading, command)):
+        return memory
+    return replace(memory, unsent="")
+
+
+def _is_answered(reading: RobotSample, command: RobotCommand) -> bool:
+    return bool(reading.refused) or reading.taken == (command.id, command.attempt)
+
+
 def _reset(memory: RobotMemory, now: float) -> RobotMemory:
-    """Send the command again at once, after an operator's reset. An action that may have begun is not
-    sent again: the reset may be for another robot of the file."""
+    """Send the command again at once, after an operator's reset. The reset may be for another robot of
+    the file. So an action that may have begun is not sent again, and a robot that a person keeps
+    standing is sent nowhere."""
     if memory.command is None:
         return memory
-    reading = memory.reading
+    reading, doing = memory.reading, memory.command.doing
     lost = reading and (reading.refused or reading.unanswered or reading.failed)
-    if memory.command.doing == "act" and not lost:
+    kept = doing not in _STAYS and reading is not None and _is_kept(reading)
+    if kept or (doing == "act" and not lost):
         return replace(memory, tries=1)
     return replace(_again(memory, now), tries=1)
+
+
+_STAYS = ("stop", "pause", "resume")
+"""The commands that send a robot nowhere by themselves."""
+
+
+def _is_kept(reading: RobotSample) -> bool:
+    """Return whether a person or the robot itself keeps the robot standing."""
+    return reading.paused is True or bool(reading.taken_out or reading.fault)
 
 
 def _order(
@@ -234,8 +262,7 @@ def _again_at(memory: RobotMemory, command: RobotCommand, limits: RobotLimits) -
     reading = memory.reading
     if reading.busy:
         return memory.asked_at + limits.t.stops_s
-    kept = reading.paused is True or bool(reading.taken_out or reading.fault)
-    if kept and command.doing != "resume":
+    if _is_kept(reading) and command.doing != "resume":
         return NEVER
     if memory.arrived_at is not None:
         return memory.arrived_at + limits.t.docks_s

@@ -57,7 +57,8 @@ class RobotMemory(msgspec.Struct, frozen=True):
     """The facts of the past that the next decision needs. Times are monotonic seconds.
 
     `reading`: the last good reading, taken at `read_at`. `fresh`: the last event brought that reading,
-    so RMF may get its place. `unread`: the reason why there is no newer reading. `stood_at`: the place
+    so RMF may get its place. `unread`: the reason why there is no newer reading. `unsent`: the reason
+    why the command could not be sent; "" when it was sent. `stood_at`: the place
     where the robot last began to stand. `moved_at`: the time when the robot was last seen to move from
     such a place. `said_at`: the robot's own time in its last reading. `said_new_at`: our time when the
     robot's own time last advanced. `off_m`: the distance from the graph, measured at the place
@@ -74,6 +75,7 @@ class RobotMemory(msgspec.Struct, frozen=True):
     read_at: float | None = None
     fresh: bool = False
     unread: str = ""
+    unsent: str = ""
     stood_at: Pose | None = None
     moved_at: float = AGES_AGO
     said_at: float | None = None

@@ -131,6 +131,11 @@ def faults(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fau
         yield Fault("ROBOT_FAULT", memory.reading.fault)
     if memory.reading.taken_out:
         yield Fault("ROBOT_TAKEN_OUT", memory.reading.taken_out)
+    if memory.reading.paused and not memory.light.held:
+        whose = (
+            "this daemon resumes only its own pauses" if limits.light else "RMF resumes no robot"
+        )
+        yield Fault("ROBOT_PAUSED_BY_OTHERS", f"it is paused, and {whose}")
     yield from _of_place(memory, limits)
     yield from _of_charge(memory, now, limits)
     yield from _of_command(memory, limits)
@@ -141,9 +146,6 @@ def faults(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fau
 def _of_light(memory: RobotMemory) -> Iterator[Fault]:
     light, reading = memory.light, memory.reading
     assert reading is not None
-    if reading.paused and not light.held:
-        text = "somebody else paused it first, and we resume only our own pauses"
-        yield Fault("ROBOT_PAUSED_BY_OTHERS", text)
     if light.answer is not None and light.answer.says == "error":
         yield Fault("ROBOT_PASSED_LIGHT", "it is where RMF has not let it go")
     if not light.path and not reading.path and not stands(memory) and memory.fresh:
@@ -179,6 +181,8 @@ def _of_command(memory: RobotMemory, limits: RobotLimits) -> Iterator[Fault]:
     assert reading is not None
     if command is None:
         return
+    if memory.unsent:
+        yield Fault("ROBOT_NOT_COMMANDED", memory.unsent)
     if reading.refused:
         yield Fault("ROBOT_REFUSES", reading.refused)
     if reading.unanswered and command.doing == "act":

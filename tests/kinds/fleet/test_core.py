@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from bridges.kinds.fleet.signals import Act, Navigate, Stop
-from bridges.kinds.shared.decision import Fault, OperatorReset
+from bridges.kinds.shared.decision import Fault, OperatorReset, WriteFailed
 from tests.kinds.fleet.story import PANTRY, SCAN_S, Story, at, driving, goal
 
 
@@ -228,6 +228,38 @@ def test_a_robot_that_a_person_keeps_standing_is_not_sent_off_again(kept: dict[s
     assert story.commands == [(0.0, "navigate 7, attempt 1")]
     story.see(1.0, paused=False, taken_out="", fault="")
     assert story.commands[-1] == (100.0, "navigate 7, attempt 2")
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [{"paused": True}, {"taken_out": "manual mode"}, {"fault": "emergency stop"}],
+    ids=lambda kept: str(next(iter(kept))),
+)
+def test_a_reset_sends_no_robot_off_that_a_person_keeps_standing(kept: dict[str, Any]) -> None:
+    """FLEET-12."""
+    story = driving(7, moving=False).see(100.0, **kept).take(OperatorReset())
+    assert story.commands == [(0.0, "navigate 7, attempt 1")]
+    story.see(1.0, paused=False, taken_out="", fault="")
+    assert story.commands[-1] == (100.0, "navigate 7, attempt 2")
+
+
+def test_a_robot_that_is_paused_says_so_with_any_control() -> None:
+    story = driving(7, moving=False).see(paused=True)
+    text = "it is paused, and RMF resumes no robot"
+    assert story.report.faults == (Fault("ROBOT_PAUSED_BY_OTHERS", text),)
+
+
+def test_a_command_that_cannot_be_sent_is_a_fault_and_rmf_still_gets_the_place() -> None:
+    """FLEET-13."""
+    story = driving(7, moving=True)
+    story.takes = False
+    story.take(WriteFailed("timeout")).see(at=at(1.0)).take(WriteFailed("timeout"))
+    assert story.report.at == at(1.0)
+    assert story.report.faults == (Fault("ROBOT_NOT_COMMANDED", "timeout"),)
+    story.takes = True
+    assert story.see().faults == []
+    story.take(WriteFailed("timeout")).see(refused="busy")
+    assert story.faults == ["ROBOT_REFUSES"]
 
 
 def test_a_reset_for_another_robot_repeats_no_action() -> None:  # FLEET-12

@@ -254,7 +254,7 @@ def test_a_robot_that_a_person_has_paused_is_not_resumed() -> None:  # FLEET-LIG
     says(story, "continue", 0).see(at=at(1.5), moving=False, paused=True)
     says(story, "resume", 0).see(60.0)
     assert story.memory.command is None
-    text = "somebody else paused it first, and we resume only our own pauses"
+    text = "it is paused, and this daemon resumes only its own pauses"
     assert story.report.faults == (Fault("ROBOT_PAUSED_BY_OTHERS", text),)
     says(story, "stay", 0).see(5.0)
     assert story.memory.command is None, "it is paused already"

@@ -109,7 +109,7 @@ def test_a_robot_without_a_trouble_is_explained_by_its_mission(
         ),
         ("ROBOT_FAULT", "motor hot", "tiny/AMR01 reports a fault of its own: motor hot."),
         ("ROBOT_OFF_GRAPH", "9 m off", "tiny/AMR01 is off the graph: 9 m off."),
-        ("ROBOT_PAUSED_BY_OTHERS", "so", "tiny/AMR01 was paused by somebody else: so."),
+        ("ROBOT_PAUSED_BY_OTHERS", "so", "tiny/AMR01 is paused, and not by RMF: so."),
     ],
 )
 def test_a_fault_is_named_with_its_remedy(code: str, detail: str, sentence: str) -> None:
