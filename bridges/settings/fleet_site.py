@@ -19,10 +19,10 @@ from yaml import SequenceNode
 from bridges.kinds.fleet.memory import RobotLimits
 from bridges.kinds.fleet.places import EVERY_LEVEL, NavGraph, RobotSite
 from bridges.kinds.fleet.settings import FleetFiles
-from bridges.kinds.shared.similarity import Similarity, estimate, odd_pair
+from bridges.kinds.shared.similarity import Similarity, estimate, fits_mirrored, odd_pair
 from bridges.settings.building_map import MAP
 from bridges.settings.config import Config
-from bridges.settings.fleet_config import FLEET, OF_MAPPING, ROBOTS, FleetFile, load_fleet
+from bridges.settings.fleet_config import FLEET, OF_MAPPING, ROBOTS, FleetFile, Pairs, load_fleet
 from bridges.settings.nav_graph import load_graph
 from bridges.yaml.parsing import Problem, SettingsError, Sort, YamlFile, compose, read
 from bridges.yaml.positions import Spot, below, locate
@@ -76,13 +76,19 @@ class FleetSite(Struct, frozen=True):
 
     def notes(self) -> Iterator[str]:
         """Yield texts about the transforms and their errors, for a person."""
-        name = Path(self.config_file).name
+        name, references = Path(self.config_file).name, self.fleet.references()
         for level, found in self.transforms.items():
             of = f" for {level}" if level else ""
             yield (
                 f"{name}: the robots' map{of} is RMF's map, turned by {found.rotation:.4f} rad and"
                 f" scaled by {found.scale:.5g}; the pairs differ by {found.error:.2f} m on RMF's map"
             )
+            pairs = references.get(level)
+            if pairs and fits_mirrored(pairs.rmf, pairs.robot, OFF_M):
+                yield (
+                    f"{name}: the pairs{of} lie on one line, so they cannot show whether the robots'"
+                    " map is the mirror image of RMF's: add a pair away from that line"
+                )
 
 
 def limits_of(config: Config, robot: str, debounce: Mapping[str, float]) -> RobotLimits:
@@ -110,6 +116,16 @@ def read_site(config: Config) -> FleetSite:
         raise SettingsError(comparing.problems)
     files = _file(config, section.config), _file(config, section.graph)
     return FleetSite(fleet, graph, transforms, tuple(fleet.references()), *map(str, files))
+
+
+def _misfit(pairs: Pairs) -> str:
+    """Return a clause that says what is wrong with the pairs, as far as they show it."""
+    if fits_mirrored(pairs.rmf, pairs.robot, OFF_M):
+        return (
+            "; the robots' map is the mirror image of RMF's: change the sign of each y of the robots'"
+            " points, and write y_axis: down below units (HTTP)"
+        )
+    return odd_pair(pairs.rmf, pairs.robot, OFF_M)
 
 
 def _numbers(fleet: FleetFile) -> Iterator[tuple[tuple[str, ...], float]]:
@@ -186,11 +202,10 @@ class _Comparing:
                 self.problems.append(fleet.problem(path, str(error)))
                 continue
             if found[level].error > OFF_M:
-                text = (
+                differ = (
                     f"the pairs do not fit: they differ by {found[level].error:.2f} m on RMF's map"
-                    f"{odd_pair(pairs.rmf, pairs.robot, OFF_M)}"
                 )
-                self.problems.append(fleet.problem(path, text))
+                self.problems.append(fleet.problem(path, differ + _misfit(pairs)))
             if level and level not in graph.levels():
                 self.problems.append(fleet.problem(path, unknown("level", level, graph.levels())))
         lacking = [level for level in graph.levels() if level not in found]
@@ -206,7 +221,14 @@ class _Comparing:
         ours = self._config.devices
         section = self._config.section
         assert isinstance(section, FleetFiles)
+        real: dict[tuple[str, ...], str] = {}
         for name, robot in ours.items():
+            known = robot.known_as or name
+            claims = self._config.driver_type(name).claims(replace(robot, known_as=known))
+            place = (self._config.bus_of(name), *([text for text, _ in claims] or [known]))
+            if (other := real.setdefault(place, name)) != name:
+                text = f"'{known}' is the robot '{other}' already: it would get two orders"
+                self._ours(("robots", name, *(["known_as"] if robot.known_as else [])), text)
             if lacks := robot.lacks(section.control):
                 self._ours(("robots", name), lacks)
             for level in robot.maps.keys() - set(graph.levels()):

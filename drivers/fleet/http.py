@@ -3,14 +3,17 @@ itself. The YAML describes the interface, or a profile does (`rmf-demos`: the ma
 tutorial and demos).
 
 A command's number (`$id`) never repeats, even after a restart of the daemon. So when a manager reports
-a completed command by its number, this cannot be an older command.
+a completed command by its number, this cannot be an older command. The core counts pauses, resumes and
+the stop of a death from the beginning, so these get a number at random.
 """
 
+import secrets
 from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Final, Protocol, cast
 from weakref import WeakKeyDictionary
 
 import msgspec
+from msgspec.structs import replace
 
 from bridges.kinds.fleet.settings import FleetRobotSettings
 from bridges.kinds.fleet.signals import Pose, RobotCommand, RobotOutputs, RobotSample
@@ -20,6 +23,7 @@ from drivers import DriverError, json_fields
 from drivers.driver_type import DriverType
 from drivers.fleet.api import FleetApi, PathFields, body_with, path_with, values
 from drivers.hal import HalError, http
+from drivers.hal.http_json import RefusedCall
 from drivers.http_call import Call, described
 from drivers.profiles import Profile
 
@@ -210,6 +214,8 @@ class HttpRobot:
             return
         try:
             refused = self._send(call, command)
+        except RefusedCall as error:
+            refused = f"{command.doing} is refused: {error}"
         except HalError:
             if command.doing == "act":
                 self._done(command, unanswered=True)
@@ -238,6 +244,8 @@ class HttpRobot:
         """Send a call. Return the manager's reason if it refuses the call, or ""."""
         if call is _NOTHING:
             return ""
+        if command.doing in ("pause", "resume") or not command.id:
+            command = replace(command, id=1 + secrets.randbelow(2**31 - 1))
         given = values(self._settings.theirs(command), self._robot, self._api.units)
         path = path_with(call.path, given)
         body = None if call.body is None else body_with(call.body, given)

@@ -97,6 +97,11 @@ class VdaRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_unk
         Name | None,
         tells("the robot's action at the end of a lane with a dock. null means no action."),
     ] = "startCharging"
+    dock_actions: Annotated[
+        dict[Name, Name | None],
+        tells("""the actions of single docks, by the docks' names in the graph, in place of
+        `dock_action`. null means no action. A dock that is no charger needs one."""),
+    ] = msgspec.field(default_factory=dict)
     actions: Annotated[
         dict[Name, VdaActionSettings],
         tells("the name of an action in `config.yaml` -> the robot's action."),
@@ -359,8 +364,9 @@ class VdaRobot:
     def _order(self, command: RobotCommand) -> None:
         assert self._at is not None
         number, last = order_id(command), list[Json]()
-        if command.doing == "dock" and self._settings.dock_action:
-            last.append(action(self._settings.dock_action, action_id("dock", number), {}, "HARD"))
+        docks = self._docks(command)
+        if docks:
+            last.append(action(docks, action_id("dock", number), {}, "HARD"))
         if command.doing == "act":
             known = self._settings.actions.get(command.activity)
             if known is None:
@@ -377,6 +383,12 @@ class VdaRobot:
         made = order(self._settings.version, command, self._at, node, within_m, (first, last))
         self._publish("order", made)
         self._order_id, self._ordered_at = number, self._bus.now()
+
+    def _docks(self, command: RobotCommand) -> str | None:
+        """Return the robot's action at the end of this command; None for no action."""
+        if command.doing != "dock" or command.goal is None:
+            return None
+        return self._settings.dock_actions.get(command.goal.dock, self._settings.dock_action)
 
     def _instant(self, kind: str, action_id: str, parameters: Mapping[str, object]) -> None:
         blocking = "NONE" if self._settings.version == "3.0" else "HARD"
@@ -413,6 +425,7 @@ def describe(settings: VdaRobotSettings, bus: MqttSettings) -> list[tuple[str, s
         for what in ("state", "visualization", "connection", "order", "instantActions")
     ]
     rows += [(f"action {name}", each.type) for name, each in settings.actions.items()]
+    rows += [(f"dock {name}", kind or "-") for name, kind in settings.dock_actions.items()]
     return [*rows, ("dock", settings.dock_action or "-"), ("on death", settings.on_death)]
 
 

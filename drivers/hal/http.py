@@ -21,7 +21,7 @@ from drivers.hal import Bus, BusType, HalError
 from drivers.hal.backoff import BACKOFF_MAX_S, Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
-from drivers.hal.http_json import WrongAnswer, excerpt, json_object
+from drivers.hal.http_json import RefusedCall, WrongAnswer, excerpt, json_object
 from drivers.hal.http_login import Signer
 from drivers.hal.http_settings import HttpSettings, Method, needs, warnings, where
 
@@ -304,7 +304,8 @@ def _check_status(url: str, reads: bool, status: int) -> None:
     if status == 200 or (not reads and 200 <= status < 300):
         return
     hint = _HINTS.get(status // 100, "200 is expected")
-    raise WrongAnswer(f"{url} answered status {status}: {hint}")
+    error = RefusedCall if status // 100 == 4 else WrongAnswer
+    raise error(f"{url} answered status {status}: {hint}")
 
 
 def _capped(raw: "BaseHTTPResponse") -> bytes:

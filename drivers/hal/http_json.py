@@ -16,6 +16,10 @@ class WrongAnswer(HalError):
     same server may succeed."""
 
 
+class RefusedCall(WrongAnswer):
+    """The error of an answer with a status 4xx: the server has not carried out the call."""
+
+
 def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:
     """Decode the answer's JSON object. Raises WrongAnswer if the answer is not a JSON object."""
     sort = content_type.partition(";")[0].strip().lower()

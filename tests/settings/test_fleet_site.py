@@ -113,6 +113,24 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
             ],
         ),
         (
+            (
+                CONFIG,
+                "[[7.0, -5.0], [4.02, -5.01], [6.98, -11.0], [3.01, -10.98]]",
+                "[[7.0, 5.0], [4.02, 5.01], [6.98, 11.0], [3.01, 10.98]]",
+            ),
+            [
+                "fleet_tiny.yaml:33:3: the pairs do not fit: they differ by 6.14 m on RMF's map; the"
+                " robots' map is the mirror image of RMF's: change the sign of each y of the robots'"
+                " points, and write y_axis: down below units (HTTP)"
+            ],
+        ),
+        (
+            (OURS, "AMR02: {profile: rmf-demos}", "AMR02: {profile: rmf-demos, known_as: AMR03}"),
+            [
+                "robots_http.yaml:25:3: 'AMR03' is the robot 'AMR02' already: it would get two orders"
+            ],
+        ),
+        (
             (CONFIG, "  L2:\n    rmf", "  L3:\n    rmf"),
             [
                 "fleet_tiny.yaml:32:1: no pairs for L2: RMF cannot place a robot on that level",
@@ -282,6 +300,15 @@ def test_check_reads_the_files_and_prints_the_transforms(
     assert main(["check", str(write())]) == 0
     said = capsys.readouterr().out
     assert "fleet_tiny.yaml: the robots' map for L1 is RMF's map, turned by 1.5683 rad" in said
+    assert "lie on one line" not in said
+    texts._texts.clear()
+    fewer = ("[[7.0, -3.0], [7.0, -1.0], [7.0, 3.0], [9.0, 3.0]]", "[[7.0, -3.0], [7.0, 3.0]]")
+    theirs = (
+        "[[12.0, -8.0], [10.0, -8.0], [6.0, -8.0], [6.0, -6.0]]",
+        "[[12.0, -8.0], [6.0, -8.0]]",
+    )
+    assert main(["check", str(write((CONFIG, *fewer), (CONFIG, *theirs)))]) == 0
+    assert "the pairs for L2 lie on one line" in capsys.readouterr().out
     texts._texts.clear()
     spoilt = write((CONFIG, "charger: wait_1", "charger: wait_9"))
     assert main(["check", str(spoilt)]) == os.EX_CONFIG

@@ -82,6 +82,12 @@ def odd_pair(these: Sequence[Point], those: Sequence[Point], most: float) -> str
     return f"; without pair {fits[0]} the others fit" if len(fits) == 1 else ""
 
 
+def fits_mirrored(these: Sequence[Point], those: Sequence[Point], most: float) -> bool:
+    """Return whether the pairs fit, with an error of at most `most`, if one map is the mirror image of
+    the other. Pairs on one line fit both ways."""
+    return _fits([(one, (x, -y)) for one, (x, y) in zip(these, those, strict=True)], most)
+
+
 def _fits(pairs: Sequence[tuple[Point, Point]], most: float) -> bool:
     try:
         return estimate([one for one, _ in pairs], [other for _, other in pairs]).error <= most

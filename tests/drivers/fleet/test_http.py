@@ -14,6 +14,8 @@ from bridges.kinds.fleet.signals import Goal, Pose, RobotCommand, RobotOutputs, 
 from drivers import DriverError
 from drivers.fleet.http import HttpRobot, HttpRobotSettings
 from drivers.hal import http
+from drivers.hal.http_json import RefusedCall
+from drivers.http_call import Call
 from hal_fakes.http import HttpServer
 from hal_fakes.http_fleet import PARTS, FakeFleetRobot
 from hal_fakes.plants import robot as robot_plant
@@ -293,6 +295,38 @@ def test_an_action_without_a_call_is_refused_by_name() -> None:
     with fleet(DEMOS) as bench:
         bench.send(RobotCommand(9, "act", activity="dance"))
         assert bench.read().refused == "there is no call for the action 'dance'"
+
+
+def test_no_pause_resume_or_stop_of_a_death_has_the_number_of_an_earlier_one() -> None:
+    sent: list[object] = []
+
+    class Heard:
+        def ask(self, path: str, method: str, body: str | None, safe: bool) -> dict[str, object]:
+            sent.append(path)
+            return {"success": True}
+
+    calls = {doing: Call(path=f"/{doing}?id=$id") for doing in ("pause", "resume", "stop")}
+    api = msgspec.structs.replace(DEMOS.interface(), **calls)
+    settings = HttpRobotSettings(api=api, on_death="pause")
+    for doing in ("pause", "resume") * 2:
+        HttpRobot("AMR01", settings, Heard()).write(RobotOutputs(RobotCommand(1, doing)))  # type: ignore[arg-type]
+        HttpRobot("AMR01", settings, Heard()).make_safe()  # type: ignore[arg-type]
+    assert len(set(sent)) == 8
+
+
+@pytest.mark.parametrize("doing", ["act", "navigate"])
+def test_a_status_4xx_refuses_the_command(doing: Any) -> None:
+    class Refuses:
+        def ask(self, path: str, method: str, body: str | None, safe: bool) -> dict[str, object]:
+            raise RefusedCall("http://x/go answered status 409: check api_base")
+
+    driver = HttpRobot("AMR01", DEMOS, Refuses())  # type: ignore[arg-type]
+    act = RobotCommand(9, "act", activity="clean", description='{"zone": "a"}')
+    driver.write(RobotOutputs(act if doing == "act" else to(4.0)))
+    assert (driver._refused, driver._unanswered) == (
+        f"{doing} is refused: http://x/go answered status 409: check api_base",
+        False,
+    )
 
 
 def test_an_action_whose_answer_is_lost_is_not_sent_again() -> None:

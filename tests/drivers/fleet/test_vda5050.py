@@ -151,6 +151,19 @@ def test_a_robot_docks_charges_and_leaves(bench: Bench) -> None:
     assert not bench.send(to(8.0, 13), completed="13", moving=False).charging
 
 
+def test_a_dock_that_is_no_charger_may_have_another_action_or_none() -> None:
+    with robot(dock_actions={"shelf": None, "rack": "pick"}) as bench:
+        bench.until(moving=False)
+        sent: list[object] = []
+        bench.driver._publish = lambda topic, message, safe=False: sent.append(message)  # type: ignore[method-assign]
+        for number, dock in enumerate(("shelf", "rack", "dock_a"), 12):
+            goal = Goal(CHARGER, "place", dock=dock)
+            bench.driver._order(RobotCommand(number, "dock", goal=goal))
+        found = [message["nodes"][-1]["actions"] for message in sent]  # type: ignore[index]
+        kinds = [[action["actionType"] for action in actions] for actions in found]
+        assert kinds == [[], ["pick"], ["startCharging"]]
+
+
 def test_an_action_is_done_when_the_robot_has_finished_it(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
