@@ -148,7 +148,11 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         73: "the JUnit file cannot be written",
     },
     "release": SENT,
-    "reset": {0: "every device has taken the reset", 1: "no daemon runs", **ORDERED},
+    "reset": {
+        0: "every device has taken the reset",
+        1: "no daemon runs, or the file has no such device",
+        **ORDERED,
+    },
     "drill": {0: "the drill has begun, or has ended", 1: "no daemon runs", **ORDERED},
     "workcell": {
         0: "the decision was obeyed",

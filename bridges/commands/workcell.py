@@ -48,10 +48,7 @@ def run(args: argparse.Namespace) -> int:
         if status is None:
             print(f"no daemon of {args.file} has written its status yet", file=sys.stderr)
             return 1
-        names = status.get("devices", {})
-        if args.device and args.device not in names:
-            has = ", ".join(names)
-            print(f"{args.file} has no device '{args.device}'; it has {has}", file=sys.stderr)
+        if not order.has_device(args.file, status, args.device):
             return 1
         doubts = list(_doubts(status, args.device))
         verdict = DecidedByPerson(args.verdict, args.request)

@@ -110,6 +110,16 @@ def _where_it_runs(places: Directories) -> Directories:
     return places
 
 
+def has_device(file: Path, status: Mapping[str, Any], device: str) -> bool:
+    """Return whether the daemon's status has this device, or `device` is "". If it has not, print its
+    devices."""
+    names = status.get("devices", {})
+    if not device or device in names:
+        return True
+    print(f"{file} has no device '{device}'; it has {', '.join(names)}", file=sys.stderr)
+    return False
+
+
 def give(file: Path, places: Directories, **order: Any) -> int:
     """Give an order to the daemon of this file, and wait for the daemon's answer. `order` has fields of
     `PersonsOrder`.

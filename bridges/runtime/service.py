@@ -53,8 +53,8 @@ FIRST_S: Final = 0.5
 """The time (s) for which a device's first scan waits for a first reading of inputs on another bus."""
 
 NOBODY_OBEYS: Final = (
-    "no device of this file obeys this order: a drill needs a device with `alarm`, and a decision"
-    " needs a workcell"
+    "no device of this file obeys this order: a drill needs a device with `alarm`, a decision needs a"
+    " workcell, and a supervisor or coordinator is reset as a whole"
 )
 
 OpenBus = Callable[[str], Bus]
@@ -146,18 +146,19 @@ class GraphService:
         self.status = node.status
         self.devices = node.devices
         self._node = node
-        self._order: OrderedByPerson = OperatorReset()
+        self._order: OperatorReset | None = OperatorReset()
 
     def obey(self, order: OrderedByPerson, device: str = "") -> None:
-        """Pass on a reset. Ignore other orders, because no kind without hardware obeys them."""
-        self._order = order
-        if isinstance(order, OperatorReset):
-            self._node.obey(order)
+        """Pass on a reset of the whole service. Ignore other orders, because no kind without hardware
+        obeys them."""
+        self._order = None if device or not isinstance(order, OperatorReset) else order
+        if self._order is not None:
+            self._node.obey(self._order)
 
     def refusals(self) -> Mapping[str, str] | None:
         """Return the reasons for which subjects have refused the last order. Return None until every
         subject has decided about the order."""
-        if not isinstance(self._order, OperatorReset):
+        if self._order is None:
             return {"": NOBODY_OBEYS}
         return refusals_of(self._order, list(self._node.subjects.values()))
 
@@ -227,18 +228,17 @@ class Devices:
 
     def obey(self, order: OrderedByPerson, device: str = "") -> None:
         """Pass on an order. A drill goes to the alarm, and a decision goes to the workcells. A reset
-        goes to the alarm and to all devices."""
+        goes to the alarm and to all devices, or only to the one device."""
         subjects: list[AnySubject] = []
-        if self._alarm and not isinstance(order, DecidedByPerson):
+        if self._alarm and not device and not isinstance(order, DecidedByPerson):
             self._alarm.obey(order)
             subjects += self._alarm.subjects.values()
-        for name, (node, loop) in self._placed.items():
-            decides = self._kind.decided_by_person and device in ("", name)
-            if not isinstance(order, DrillOrdered) and (
-                decides or not isinstance(order, DecidedByPerson)
-            ):
-                loop.inbox.put(name, order)
-                subjects.append(node.subject)
+        decides = self._kind.decided_by_person or not isinstance(order, DecidedByPerson)
+        if decides and not isinstance(order, DrillOrdered):
+            for name, (node, loop) in self._placed.items():
+                if device in ("", name):
+                    loop.inbox.put(name, order)
+                    subjects.append(node.subject)
         self._ordered = order, subjects
 
     def refusals(self) -> Mapping[str, str] | None:

@@ -20,14 +20,15 @@ from bridges.system.directories import by_hand
 
 
 @contextmanager
-def obedient(file: Path) -> Iterator[RuntimeDirectory]:
-    """Serve this file by hand in this process, and obey each order at its signal."""
+def obedient(file: Path, **devices: Any) -> Iterator[RuntimeDirectory]:
+    """Serve this file by hand in this process, and obey each order at its signal. `devices`: the status
+    of each device."""
     runtime = RuntimeDirectory(by_hand(file), file, serves=True)
 
     def show(*given: order.PersonsOrder) -> None:
         process: dict[str, Any] = msgspec.to_builtins(runtime.process)
         answers = [order.OrderAnswered(one.id, {}) for one in given]
-        status = process | {"order": answers[-1] if answers else None}
+        status = process | {"order": answers[-1] if answers else None, "devices": devices}
         runtime.write_status(msgspec.json.encode(status))
 
     before = signal.signal(RESET, lambda *_: show(*order.take(runtime.path, file)))
@@ -62,6 +63,20 @@ def test_a_daemon_started_by_cron_obeys_an_order_from_a_login_shell(
         assert by_hand(yaml).runtime != daemon.path
         assert main(["reset", str(yaml)]) == 0
     assert capsys.readouterr() == ("reset; no fault remains\n", "")
+
+
+def test_a_reset_of_one_device_tells_only_what_remains_there_and_names_the_devices(
+    yaml: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    jammed = {"faults": [{"code": "DOOR_OBSTRUCTED", "detail": "not clear"}]}
+    with obedient(yaml, ward={"faults": []}, lab=jammed):
+        assert main(["reset", str(yaml)]) == 0
+        assert main(["reset", str(yaml), "--device", "ward"]) == 0
+        assert main(["reset", str(yaml), "--device", "lap"]) == 1
+    assert capsys.readouterr() == (
+        "remains: lab: DOOR_OBSTRUCTED: not clear\nreset; no fault remains\n",
+        f"{yaml} has no device 'lap'; it has ward, lab\n",
+    )
 
 
 def test_an_order_to_a_daemon_in_an_unknown_directory_is_reported_with_the_remedy(

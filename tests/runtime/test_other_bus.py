@@ -10,11 +10,13 @@ from typing import Final
 import pytest
 
 from bridges.blackbox.ring import RingContent
+from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages.constants import LiftMode, LiftRequestDoor, LiftRequestType
 from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, LiftRequest
 from bridges.messages.topics import DOOR_REQUESTS, LIFT_REQUESTS
 from bridges.runtime.clock import Clock
 from bridges.runtime.other_bus import Handover, OtherReading
+from bridges.runtime.service import NOBODY_OBEYS
 from drivers import DriverError
 from tests.depth import depth, part
 from tests.runtime.on_two_buses import DOOR, OnTwoBuses
@@ -64,6 +66,13 @@ def modes(on: OnTwoBuses) -> list[str]:
     """Return the door's modes in order, without repetitions."""
     names = (DoorModeValue(state.current_mode.value).name[5:] for _, state in on.states)
     return [name for name, _ in itertools.groupby(names)]
+
+
+def test_a_reset_of_one_device_goes_to_that_device(door: OnTwoBuses) -> None:
+    for device, answer in (("D", {}), ("", {}), ("E", {"": NOBODY_OBEYS})):
+        door.served.obey(OperatorReset(), device)
+        door.run(1.0)
+        assert door.served.refusals() == answer
 
 
 def test_a_door_obeys_its_own_bus_and_reads_its_fire_contact_on_the_other(door: OnTwoBuses) -> None:
