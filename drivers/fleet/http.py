@@ -119,6 +119,7 @@ class HttpRobot:
         self._api = settings.interface()
         self._bus = bus
         self._sent, self._running = (0, 0), 0
+        self._numbered: tuple[tuple[str, int, int], int] = ("", 0, 0), 0
         self._refused = ""
         self._unanswered = False
 
@@ -245,7 +246,7 @@ class HttpRobot:
         if call is _NOTHING:
             return ""
         if command.doing in ("pause", "resume") or not command.id:
-            command = replace(command, id=1 + secrets.randbelow(2**31 - 1))
+            command = replace(command, id=self._number_of(command))
         given = values(self._settings.theirs(command), self._robot, self._api.units)
         path = path_with(call.path, given)
         body = None if call.body is None else body_with(call.body, given)
@@ -258,6 +259,14 @@ class HttpRobot:
             return ""
         why = json_fields.clean(str(answer.get("msg") or ""))
         return f"{command.doing} is refused" + (f": {why}" if why else "")
+
+    def _number_of(self, command: RobotCommand) -> int:
+        """Return a number at random for this attempt. A call that is sent again in the same attempt has
+        the same number."""
+        attempt = command.doing, command.id, command.attempt
+        if self._numbered[0] != attempt:
+            self._numbered = attempt, 1 + secrets.randbelow(2**31 - 1)
+        return self._numbered[1]
 
     def make_safe(self) -> None:
         """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the

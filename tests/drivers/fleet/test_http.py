@@ -13,7 +13,7 @@ import pytest
 from bridges.kinds.fleet.signals import Goal, Pose, RobotCommand, RobotOutputs, RobotSample
 from drivers import DriverError
 from drivers.fleet.http import HttpRobot, HttpRobotSettings
-from drivers.hal import http
+from drivers.hal import HalError, http
 from drivers.hal.http_json import RefusedCall
 from drivers.http_call import Call
 from hal_fakes.http import HttpServer
@@ -312,6 +312,22 @@ def test_no_pause_resume_or_stop_of_a_death_has_the_number_of_an_earlier_one() -
         HttpRobot("AMR01", settings, Heard()).write(RobotOutputs(RobotCommand(1, doing)))  # type: ignore[arg-type]
         HttpRobot("AMR01", settings, Heard()).make_safe()  # type: ignore[arg-type]
     assert len(set(sent)) == 8
+
+
+def test_a_pause_that_is_sent_again_in_the_same_attempt_has_the_same_number() -> None:
+    sent: list[object] = []
+
+    class Deaf:
+        def ask(self, path: str, method: str, body: str | None, safe: bool) -> dict[str, object]:
+            sent.append(path)
+            raise HalError("timeout")
+
+    api = msgspec.structs.replace(DEMOS.interface(), pause=Call(path="/pause?id=$id"))
+    driver = HttpRobot("AMR01", HttpRobotSettings(api=api), Deaf())  # type: ignore[arg-type]
+    for attempt in (1, 1, 2, 2):
+        with pytest.raises(HalError):
+            driver.write(RobotOutputs(RobotCommand(1, "pause", attempt)))
+    assert (sent[0], sent[2], len(set(sent))) == (sent[1], sent[3], 2)
 
 
 @pytest.mark.parametrize("doing", ["act", "navigate"])
