@@ -58,11 +58,10 @@ class RobotMemory(msgspec.Struct, frozen=True):
 
     `reading`: the last good reading, taken at `read_at`. `fresh`: the last event brought that reading,
     so RMF may get its place. `unread`: the reason why there is no newer reading. `unsent`: the reason
-    why the command could not be sent; "" when it was sent. `stood_at`: the place
-    where the robot last began to stand. `moved_at`: the time when the robot was last seen to move from
-    such a place. `said_at`: the robot's own time in its last reading. `said_new_at`: our time when the
-    robot's own time last advanced. `off_m`: the distance from the graph, measured at the place
-    `off_at`.
+    why the command could not be sent; "" when it was sent. `stood_at`: the place where the robot last
+    began to stand. `moved_at`: the time when the robot was last seen to move from such a place.
+    `said_at`: the robot's own time in its last reading. `said_new_at`: our time when the robot's own
+    time last advanced. `off_m`: the distance from the graph, measured at the place `off_at`.
 
     `command`: the command that the robot must carry out. `asked_at`: the time of the last attempt.
     `tries`: the number of attempts since the command began, or since an operator's reset. `arrived_at`:
