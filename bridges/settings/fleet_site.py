@@ -6,6 +6,7 @@ them.
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cache
@@ -75,7 +76,8 @@ class FleetSite(Struct, frozen=True):
         return {name: robot.waypoint()[1] for _, name, robot in self.fleet.robots()}
 
     def notes(self) -> Iterator[str]:
-        """Yield texts about the transforms and their errors, for a person."""
+        """Yield texts for a person: the transforms with their errors, chargers that robots share, and
+        waypoints without a lane."""
         name, references = Path(self.config_file).name, self.fleet.references()
         for level, found in self.transforms.items():
             of = f" for {level}" if level else ""
@@ -89,6 +91,14 @@ class FleetSite(Struct, frozen=True):
                     f"{name}: the pairs{of} lie on one line, so they cannot show whether the robots'"
                     " map is the mirror image of RMF's: add a pair away from that line"
                 )
+        for waypoint, count in Counter(self.chargers().values()).items():
+            if waypoint and count > 1:
+                yield f"{name}: {count} robots have the charger '{waypoint}': all drive there"
+        reached = {lane.end for lane in self.graph.lanes}
+        for number, vertex in enumerate(self.graph.vertices):
+            if vertex.name and number not in reached:
+                where = Path(self.graph_file).name
+                yield f"{where}: no lane leads to '{vertex.name}', so RMF sends no robot there"
 
 
 def limits_of(config: Config, robot: str, debounce: Mapping[str, float]) -> RobotLimits:

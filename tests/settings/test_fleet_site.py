@@ -300,15 +300,20 @@ def test_check_reads_the_files_and_prints_the_transforms(
     assert main(["check", str(write())]) == 0
     said = capsys.readouterr().out
     assert "fleet_tiny.yaml: the robots' map for L1 is RMF's map, turned by 1.5683 rad" in said
-    assert "lie on one line" not in said
+    assert not any(text in said for text in ("lie on one line", "no lane", "have the charger"))
     texts._texts.clear()
     fewer = ("[[7.0, -3.0], [7.0, -1.0], [7.0, 3.0], [9.0, 3.0]]", "[[7.0, -3.0], [7.0, 3.0]]")
     theirs = (
         "[[12.0, -8.0], [10.0, -8.0], [6.0, -8.0], [6.0, -6.0]]",
         "[[12.0, -8.0], [6.0, -8.0]]",
     )
-    assert main(["check", str(write((CONFIG, *fewer), (CONFIG, *theirs)))]) == 0
-    assert "the pairs for L2 lie on one line" in capsys.readouterr().out
+    shared = (CONFIG, "AMR02: {charger: wait_2}", "AMR02: {charger: wait_1}")
+    cut = (GRAPH, "      - [8, 9, {}]\n", "")
+    assert main(["check", str(write((CONFIG, *fewer), (CONFIG, *theirs), shared, cut))]) == 0
+    said = capsys.readouterr().out
+    assert "the pairs for L2 lie on one line" in said
+    assert "no lane leads to 'pharmacy', so RMF sends no robot there" in said
+    assert "2 robots have the charger 'wait_1': all drive there" in said
     texts._texts.clear()
     spoilt = write((CONFIG, "charger: wait_1", "charger: wait_9"))
     assert main(["check", str(spoilt)]) == os.EX_CONFIG
