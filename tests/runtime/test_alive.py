@@ -182,7 +182,7 @@ def test_a_reset_during_the_start_does_no_harm(
 ) -> None:
     """The test repeats `rmf-bridge reset`, from before the daemon's start until the daemon serves."""
     run = tmp_path / "run"
-    asked = argparse.Namespace(file=module.file, runtime_dir=str(run))
+    asked = argparse.Namespace(file=module.file, runtime_dir=str(run), device="")
     codes: list[tuple[bool, int]] = []
     with daemon(module.file, run, **SERVICE) as running:
 
