@@ -253,12 +253,12 @@ def test_a_command_that_cannot_be_sent_is_a_fault_and_rmf_still_gets_the_place()
     """FLEET-13."""
     story = driving(7, moving=True)
     story.takes = False
-    story.take(WriteFailed("timeout")).see(at=at(1.0)).take(WriteFailed("timeout"))
+    story.take(WriteFailed("timeout")).see(at=at(1.0))
     assert story.report.at == at(1.0)
     assert story.report.faults == (Fault("ROBOT_NOT_COMMANDED", "timeout"),)
     story.takes = True
     assert story.see().faults == []
-    story.take(WriteFailed("timeout")).see(refused="busy")
+    story.take(WriteFailed("timeout")).see(refused="busy", taken=(0, 0))
     assert story.faults == ["ROBOT_REFUSES"]
 
 
