@@ -73,6 +73,9 @@ RELOCALISED_M = 3.0
 ride. It is large, because RMF expects the robot at the lift's waypoint, but the robot may stand
 anywhere in the lift car."""
 
+_STAYS = ("stop", "pause", "resume")
+"""The commands that send a robot nowhere by themselves."""
+
 FleetDecision = Decision[RobotMemory, RobotOutputs, RobotReport]
 
 
@@ -144,10 +147,6 @@ def _reset(memory: RobotMemory, now: float) -> RobotMemory:
     if kept or (doing == "act" and not lost):
         return replace(memory, tries=1)
     return replace(_again(memory, now), tries=1)
-
-
-_STAYS = ("stop", "pause", "resume")
-"""The commands that send a robot nowhere by themselves."""
 
 
 def _is_kept(reading: RobotSample) -> bool:

@@ -86,7 +86,7 @@ class DdsPeers:
         return {key.bytes for key in self._peers.present() if isinstance(key, uuid.UUID)}
 
     def _take_one(self, reader: BuiltinReader, publishes: bool) -> bool:
-        """Take the next announcement, and return whether there was one that could be read.
+        """Take the next announcement. Return False if none is left, or if it could not be read.
 
         Announcements are taken one by one, because DDS gives none of several if one of them cannot be
         read."""

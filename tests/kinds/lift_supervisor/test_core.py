@@ -161,24 +161,17 @@ def test_the_end_of_a_claim_for_a_floor_that_is_not_served_is_no_persons() -> No
     assert (end.request_type, end.door_state) == (core.END, 0)
 
 
-def test_a_robot_that_waits_for_a_served_floor_stays_in_the_queue_after_a_wrong_request() -> None:
+@pytest.mark.parametrize(("floor", "waiting"), [("L1", ["a"]), ("L9", [])])
+def test_after_a_request_for_an_unserved_floor_only_a_claim_for_a_served_one_stays_in_the_queue(
+    floor: str, waiting: list[str]
+) -> None:
     desk = Alone()
     desk.asks("b")
-    desk.asks("a", "L1")
+    desk.asks("a", floor)
     desk.shows("b", "L3", to="L3", open=True, floors=("L1", "L3"))
     desk.until(1.0)
     desk.asks("a", "L9")
-    assert (desk.waiting, desk.sent) == (["a"], [(0.0, "AGV b L3")])
-
-
-def test_a_waiting_claim_for_a_floor_that_is_no_longer_served_leaves_the_queue() -> None:
-    desk = Alone()
-    desk.asks("b")
-    desk.asks("a", "L9")
-    desk.shows("b", "L3", to="L3", open=True, floors=("L1", "L3"))
-    desk.until(1.0)
-    desk.asks("a", "L9")
-    assert (desk.waiting, desk.sent) == ([], [(0.0, "AGV b L3")])
+    assert (desk.waiting, desk.sent) == (waiting, [(0.0, "AGV b L3")])
 
 
 def test_a_session_in_the_lift_stays_when_its_floor_is_no_longer_served() -> None:
