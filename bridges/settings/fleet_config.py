@@ -5,7 +5,7 @@ match:
       name: tiny
       recharge_threshold: 0.2           # below this charge RMF gives a robot no task
       recharge_soc: 1.0                 # at this charge RMF's ChargeBattery ends
-      finishing_request: charge         # charge, park or nothing
+      finishing_request: charge         # charge, park or nothing; since 2.10 also {type: park}
       publish_fleet_state: 10.0         # Hz
       account_for_battery_drain: true
       lift_emergency_levels: {Lift1: L1}   # since Iron; where a robot in the car gets out in an alarm
@@ -32,6 +32,7 @@ from yaml.constructor import SafeConstructor
 from bridges.kinds.shared.similarity import Point, Similarity
 from bridges.yaml.parsing import Problem, SettingsError, Sort, YamlFile, compose, read
 from bridges.yaml.positions import Spot, locate
+from bridges.yaml.spelling import unknown
 
 FLEET = Sort("fleet configuration", "rmf_fleet: ...", 256 * 1024, 20_000)
 EVERY_LEVEL = ""
@@ -41,6 +42,8 @@ Path = tuple[str, ...]
 ROBOTS: Final = ("rmf_fleet", "robots")
 """The only place where RMF's adapter reads robots. It reads the text `charger` of each robot."""
 OF_MAPPING: Final = ("charger", "waypoint")
+FINISHES: Final = "finishing_request"
+FINISHING: Final = ("charge", "park", "nothing")
 OF_ADAPTER: Final = "is this a fleet adapter's configuration?"
 T = TypeVar("T")
 
@@ -58,10 +61,23 @@ class OlderRobot(msgspec.Struct, frozen=True):
     charger: Charger | None = None
 
 
+class FinishingTask(msgspec.Struct, frozen=True):
+    """What a robot does after a task, if it is written as a mapping. `waypoint_name`: where this robot
+    parks. RMF reads it for the type park alone."""
+
+    type: str
+    waypoint_name: str | None = None
+
+
+FinishingRequest = str | FinishingTask | None
+
+
 class RobotConfig(msgspec.Struct, frozen=True):
-    """One robot with its charger's waypoint, in the new or the older form."""
+    """One robot with its charger's waypoint, in the new or the older form. Its `finishing_request`, if
+    there is one, takes the place of the fleet's (since 2.10)."""
 
     charger: str | Charger | None = None
+    finishing_request: FinishingRequest = None
     rmf_config: OlderRobot | None = None
 
     def waypoint(self) -> tuple[Path, str | None]:
@@ -111,7 +127,7 @@ class RmfFleet(msgspec.Struct, frozen=True):
     transforms: dict[str, MapTransform] = msgspec.field(default_factory=dict)
     recharge_threshold: Soc | None = None
     recharge_soc: Soc | None = None
-    finishing_request: str | None = None
+    finishing_request: FinishingRequest = None
     publish_fleet_state: float | None = None
     account_for_battery_drain: bool | None = None
     lift_emergency_levels: dict[str, str] = msgspec.field(default_factory=dict)
@@ -166,9 +182,41 @@ class FleetFile(msgspec.Struct, frozen=True):
             return {EVERY_LEVEL: manager.reference_coordinates}
         return self.contents.reference_coordinates or {}
 
+    def finishing(self) -> Iterator[tuple[Path, str | None]]:
+        """Yield what RMF orders after a task (one of FINISHING), with its path: each robot's own order,
+        and the fleet's order if it holds for a robot or there are no robots."""
+        own = [(path, robot.finishing_request) for path, _, robot in self.robots()]
+        if None in [request for _, request in own] or not own:
+            yield ("rmf_fleet", FINISHES), _type(self.fleet.finishing_request)
+        for path, request in own:
+            if request is not None:
+                yield (*path, FINISHES), _type(request)
+
+    def unfit_finishing(self) -> Iterator[Problem]:
+        """Yield a problem for each finishing request that RMF's adapter refuses."""
+        of_fleet, path = self.fleet.finishing_request, ("rmf_fleet", FINISHES)
+        requests = {path: _type(of_fleet), **dict(self.finishing())}
+        for where, request in requests.items():
+            if request is not None and request not in FINISHING:
+                yield self.problem(where, unknown(FINISHES, request, FINISHING))
+        if parking_spot(of_fleet) is not None:
+            text = "would send all robots to one place: write this waypoint below a robot"
+            yield self.problem((*path, "waypoint_name"), text)
+
     def problem(self, path: Path, text: str) -> Problem:
         """Return a problem at this path."""
         return problem_at(self.file, self.root, path, text)
+
+
+def parking_spot(request: FinishingRequest) -> str | None:
+    """Return the waypoint to which a robot goes after a task; None if the request names none."""
+    if isinstance(request, FinishingTask) and request.type == "park":
+        return request.waypoint_name
+    return None
+
+
+def _type(request: FinishingRequest) -> str | None:
+    return request.type if isinstance(request, FinishingTask) else request
 
 
 def load_fleet(file: str, text: bytes | None = None) -> FleetFile:

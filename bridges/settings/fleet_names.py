@@ -28,7 +28,6 @@ Transforms = Mapping[str, Similarity]
 """Level -> transform from RMF's map to the robot's map. If one transform holds for all levels, the
 level is EVERY_LEVEL."""
 LEAST_HZ = 1.0
-FINISHING = ("charge", "park", "nothing")
 
 
 class Compared(Struct):
@@ -149,18 +148,15 @@ class _Comparing:
             self._theirs("errors", ("rmf_fleet", "recharge_threshold"), text)
 
     def finishing(self) -> None:
-        """Check the fleet's `finishing_request`, which tells a robot what to do after a task."""
-        request = self._fleet.fleet.finishing_request
-        path = ("rmf_fleet", "finishing_request")
-        if request is not None and request not in FINISHING:
-            text = unknown("finishing_request", request, FINISHING)
-            self._theirs("errors", path, text)
-        elif request in (None, "nothing"):
-            text = (
-                "if finishing_request is 'nothing' or missing, a charged robot stays on its pad until"
-                " it gets a task, and the next robot waits: write finishing_request 'charge'"
-            )
-            self._theirs("warnings", path if request else ("rmf_fleet",), text)
+        """Check each `finishing_request`, which tells a robot what to do after a task."""
+        self.all.errors += self._fleet.unfit_finishing()
+        for path, request in self._fleet.finishing():
+            if request in (None, "nothing"):
+                text = (
+                    "if finishing_request is 'nothing' or missing, a charged robot stays on its pad"
+                    " until it gets a task, and the next robot waits: write finishing_request 'charge'"
+                )
+                self._theirs("warnings", path if request else ("rmf_fleet",), text)
 
     def needed(self) -> None:
         """Check the keys that charging needs. Without these keys the coordinator sees no robot, or RMF

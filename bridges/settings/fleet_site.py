@@ -7,7 +7,7 @@ them.
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from msgspec import Struct
 from msgspec.structs import replace
-from yaml import SequenceNode
+from yaml import MappingNode, SequenceNode
 
 from bridges.kinds.fleet.memory import RobotLimits
 from bridges.kinds.fleet.places import EVERY_LEVEL, NavGraph, RobotSite
@@ -23,14 +23,21 @@ from bridges.kinds.fleet.settings import FleetFiles
 from bridges.kinds.shared.similarity import Similarity, estimate, fits_mirrored, odd_pair
 from bridges.settings.building_map import MAP
 from bridges.settings.config import Config
-from bridges.settings.fleet_config import FLEET, OF_MAPPING, ROBOTS, FleetFile, Pairs, load_fleet
+from bridges.settings.fleet_config import (
+    FLEET,
+    OF_MAPPING,
+    ROBOTS,
+    FleetFile,
+    Pairs,
+    load_fleet,
+    parking_spot,
+)
 from bridges.settings.nav_graph import load_graph
 from bridges.yaml.parsing import Problem, SettingsError, Sort, YamlFile, compose, read
 from bridges.yaml.positions import Spot, below, locate
-from bridges.yaml.spelling import unknown
+from bridges.yaml.spelling import nearest, short, unknown
 from drivers.profiles import texts
 
-FINISHING: Final = ("charge", "park", "nothing")
 NEEDED: Final = (
     ("limits", "linear"),
     ("limits", "angular"),
@@ -47,6 +54,25 @@ NEEDED: Final = (
 )
 """Keys below `rmf_fleet` without which RMF's adapter does not read the file (EasyFullControl.cpp,
 `from_config_files`)."""
+READ: Final = frozenset(
+    (
+        *(section for section, _ in NEEDED),
+        *("account_for_battery_drain", "actions", "finishing_request", "fleet_manager"),
+        *("lift_emergency_levels", "max_delay", "max_merge_lane_distance"),
+        *("max_merge_waypoint_distance", "min_lane_length", "name", "publish_fleet_state"),
+        *("recharge_soc", "recharge_threshold", "responsive_wait", "retreat_to_charger_interval"),
+        *("reversible", "robots", "skip_rotation_commands", "strict_lanes", "task_capabilities"),
+        *("task_assignment_strategy", "transforms", "use_parking_reservations"),
+    )
+)
+READ_OF_ROBOT: Final = frozenset(
+    (
+        *("charger", "finishing_request", "max_merge_lane_distance"),
+        *("max_merge_waypoint_distance", "min_lane_length", "responsive_wait"),
+    )
+)
+"""The keys below `rmf_fleet`, and below each of its robots, that an adapter reads (the same place, and
+`fleet_manager` of fleet_adapter_template). RMF passes over any other key without a word."""
 OFF_M: Final = 0.5
 """The greatest error (m) of the pairs of coordinates. With a greater error, RMF would see a robot
 beside its lane."""
@@ -76,8 +102,8 @@ class FleetSite(Struct, frozen=True):
         return {name: robot.waypoint()[1] for _, name, robot in self.fleet.robots()}
 
     def notes(self) -> Iterator[str]:
-        """Yield texts for a person: the transforms with their errors, chargers that robots share, and
-        waypoints without a lane."""
+        """Yield texts for a person: the transforms with their errors, misspelt keys, chargers that
+        robots share, and waypoints without a lane."""
         name, references = Path(self.config_file).name, self.fleet.references()
         for level, found in self.transforms.items():
             of = f" for {level}" if level else ""
@@ -91,6 +117,7 @@ class FleetSite(Struct, frozen=True):
                     f"{name}: the pairs{of} lie on one line, so they cannot show whether the robots'"
                     " map is the mirror image of RMF's: add a pair away from that line"
                 )
+        yield from _misspelt(self.fleet)
         for waypoint, count in Counter(self.chargers().values()).items():
             if waypoint and count > 1:
                 yield f"{name}: {count} robots have the charger '{waypoint}': all drive there"
@@ -126,6 +153,25 @@ def read_site(config: Config) -> FleetSite:
         raise SettingsError(comparing.problems)
     files = _file(config, section.config), _file(config, section.graph)
     return FleetSite(fleet, graph, transforms, tuple(fleet.references()), *map(str, files))
+
+
+def _not_in_graph(waypoint: str, known: Sequence[str]) -> str:
+    return f"the graph has no {unknown('waypoint', waypoint, known)[8:]}"
+
+
+def _misspelt(fleet: FleetFile) -> Iterator[str]:
+    """Yield a text for each key that RMF's adapter does not read, and that looks like one that it
+    reads."""
+    robots = [path for path, _, _ in fleet.robots()]
+    for path, known in ((("rmf_fleet",), READ), *((path, READ_OF_ROBOT) for path in robots)):
+        section = locate(Spot(fleet.root, fleet.root, "the file"), path).value
+        entries = section.value if isinstance(section, MappingNode) else ()
+        present = {key.value for key, _ in entries}
+        for key in sorted(present - known):
+            if near := nearest(key, known - present):
+                text = f"RMF's adapter does not read '{short(key)}': did you mean '{near}'?"
+                found = fleet.problem((*path, key), text)
+                yield str(replace(found, file=Path(fleet.file).name))
 
 
 def _misfit(pairs: Pairs) -> str:
@@ -196,10 +242,7 @@ class _Comparing:
             if not (least and number < math.inf):  # so NaN is refused too
                 text = "is not possible for a robot: RMF's planner would fail"
                 self.problems.append(fleet.problem(path, text))
-        asked = fleet.fleet.finishing_request
-        if asked is not None and asked not in FINISHING:
-            text = unknown("finishing_request", asked, FINISHING)
-            self.problems.append(fleet.problem(("rmf_fleet", "finishing_request"), text))
+        self.problems += fleet.unfit_finishing()
 
     def transforms(self, fleet: FleetFile, graph: NavGraph) -> dict[str, Similarity]:
         """Return level -> transform, from RMF's own transforms and from pairs of points."""
@@ -269,8 +312,13 @@ class _Comparing:
                 text = f"RMF's adapter does not read this form: below {': '.join(ROBOTS)} write"
                 self.problems.append(fleet.problem((*path, *inner), f"{text} '{line}'"))
             elif vertex is None:
-                text = f"the graph has no {unknown('waypoint', charger, known)[8:]}"
-                self.problems.append(fleet.problem((*path, *inner), text))
+                self.problems.append(fleet.problem((*path, *inner), _not_in_graph(charger, known)))
+            spot = parking_spot(robot.finishing_request)
+            if spot is not None and not graph.called(spot):
+                text = _not_in_graph(spot, known)
+                self.problems.append(
+                    fleet.problem((*path, "finishing_request", "waypoint_name"), text)
+                )
 
     def names(self, fleet: FleetFile, graph: NavGraph) -> None:
         """Compare the fleet's recall floors with the stops of the graph's lifts. At its recall floor a

@@ -161,7 +161,8 @@ def tutorial_fleet(
         if waypoint is None or waypoint not in graph:
             raise ValueError(f"{file}: '{name}' has its charger at {waypoint!r}, not in the graph")
         places[name] = waypoint
-    request = found.fleet.finishing_request or "nothing"
+    _, request = next(found.finishing())
+    request = request or "nothing"
     if request not in get_args(Finishing):
         raise ValueError(f"{file}: no finishing_request {request!r}")
     return FleetAdapter(found.fleet.name, graph, places, drive_s, cast(Finishing, request))

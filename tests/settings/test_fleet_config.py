@@ -247,6 +247,13 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
             " 'charge'",
         ),
         (
+            "AMR02: {charger: dock_b}",
+            "AMR02: {charger: dock_b, finishing_request: {type: nothing}}",
+            "config.yaml:8:30: warning: if finishing_request is 'nothing' or missing, a charged robot"
+            " stays on its pad until it gets a task, and the next robot waits: write finishing_request"
+            " 'charge'",
+        ),
+        (
             "    AMR02: {charger: dock_b}\n",
             "    AMR02: {charger: dock_b}\n    AMR03: {charger: wait_1}\n",
             "config.yaml:9:5: warning: no station of ours charges 'AMR03'",
@@ -267,6 +274,14 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
 def test_a_likely_mistake_gives_a_warning(site: Site, old: str, new: str, warning: str) -> None:
     assert THEIRS.count(old) == 1
     assert site.check(theirs=THEIRS.replace(old, new)) == (0, [warning])
+
+
+def test_a_robots_own_finishing_request_takes_the_place_of_the_fleets(site: Site) -> None:
+    none = THEIRS.replace("  finishing_request: park\n", "")
+    own = none.replace("charger_a}", "charger_a, finishing_request: charge}")
+    assert site.check(theirs=own)[1]  # the other robot has none
+    own = own.replace("dock_b}", "dock_b, finishing_request: {type: charge}}")
+    assert site.check(theirs=own) == (0, [])
 
 
 def test_the_older_form_of_the_file_says_the_same(site: Site) -> None:

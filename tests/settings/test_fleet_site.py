@@ -98,6 +98,47 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
             ],
         ),
         (
+            (CONFIG, "finishing_request: charge", "finishing_request: {type: sleep}"),
+            [
+                "fleet_tiny.yaml:23:3: unknown finishing_request 'sleep': known here: charge, park,"
+                " nothing"
+            ],
+        ),
+        (
+            (
+                CONFIG,
+                "finishing_request: charge",
+                "finishing_request: {type: park, waypoint_name: wait_1}",
+            ),
+            [
+                "fleet_tiny.yaml:23:35: would send all robots to one place: write this waypoint below"
+                " a robot"
+            ],
+        ),
+        (
+            (
+                CONFIG,
+                "{charger: wait_1}",
+                "{charger: wait_1, finishing_request: {type: park, waypoint_name: wait_7}}",
+            ),
+            [
+                "fleet_tiny.yaml:27:62: the graph has no waypoint 'wait_7': did you mean 'wait_3'?"
+                " known here: charger_a, dock_b, wait_1, wait_2, wait_3, pharmacy, lift_lobby,"
+                " lift1_L1, lift1_L2, ward, ward_store"
+            ],
+        ),
+        *(
+            (
+                (
+                    CONFIG,
+                    "{charger: wait_1}",
+                    f"{{charger: wait_1, finishing_request: {{type: {task}}}}}",
+                ),
+                [],
+            )
+            for task in ("park, waypoint_name: wait_2", "charge, waypoint_name: wait_7", "nothing")
+        ),
+        (
             (CONFIG, "lift_emergency_levels: {Lift1: L1}", "lift_emergency_levels: {Lift1: L7}"),
             ["fleet_tiny.yaml:22:27: unknown floor 'L7': known here: L1, L2"],
         ),
@@ -300,7 +341,8 @@ def test_check_reads_the_files_and_prints_the_transforms(
     assert main(["check", str(write())]) == 0
     said = capsys.readouterr().out
     assert "fleet_tiny.yaml: the robots' map for L1 is RMF's map, turned by 1.5683 rad" in said
-    assert not any(text in said for text in ("lie on one line", "no lane", "have the charger"))
+    silent = ("lie on one line", "no lane", "have the charger", "does not read")
+    assert not any(text in said for text in silent)
     texts._texts.clear()
     fewer = ("[[7.0, -3.0], [7.0, -1.0], [7.0, 3.0], [9.0, 3.0]]", "[[7.0, -3.0], [7.0, 3.0]]")
     theirs = (
@@ -314,6 +356,20 @@ def test_check_reads_the_files_and_prints_the_transforms(
     assert "the pairs for L2 lie on one line" in said
     assert "no lane leads to 'pharmacy', so RMF sends no robot there" in said
     assert "2 robots have the charger 'wait_1': all drive there" in said
+    texts._texts.clear()
+    own = (CONFIG, "  reversible: true", "  reversable: true\n  colour: blue")
+    misspelt = (
+        CONFIG,
+        "AMR03: {charger: wait_3}",
+        "AMR03: {charger: wait_3, responsive_wiat: true}",
+    )
+    assert main(["check", str(write(own, misspelt))]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    where = "fleet_tiny.yaml"
+    knows = "RMF's adapter does not read"
+    assert f"{where}:12:3: {knows} 'reversable': did you mean 'reversible'?" in said
+    assert f"{where}:30:30: {knows} 'responsive_wiat': did you mean 'responsive_wait'?" in said
+    assert said.count(knows) == 2
     texts._texts.clear()
     spoilt = write((CONFIG, "charger: wait_1", "charger: wait_9"))
     assert main(["check", str(spoilt)]) == os.EX_CONFIG
