@@ -14,6 +14,7 @@ from bridges.kinds.shared.rmf_section import Rmf, Zenoh
 from bridges.settings.config import Config
 from bridges.settings.named_files import CERTIFICATES, SECRETS, named_files
 from bridges.system.directories import SERVICE_USER, user_of
+from bridges.transports.zenoh.config import is_local, mode
 from workbench.commissioning.doctor.finding import Finding, note, ok, unknown, warning, wrong
 from workbench.commissioning.doctor.machine import Machine
 
@@ -29,6 +30,8 @@ ENABLE: Final = "rmf-bridge enable FILE"
 ENCRYPTED: Final = ("tls/", "quic/", "https://")
 OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 OTHERS_READ: Final = stat.S_IRWXG | stat.S_IRWXO
+LOGINS: Final = ("passwordauthentication", "kbdinteractiveauthentication", "permitrootlogin")
+"""The settings of sshd that must be `no`. A password can also come by keyboard-interactive."""
 LISTENS: Final = {"tcp": "0A", "udp": "07"}
 """Protocol -> a socket state in /proc/net, as a hexadecimal number. A socket in this state is open and
 has no peer (include/net/tcp_states.h)."""
@@ -87,7 +90,9 @@ def _speaks(rmf: Rmf, machine: Machine) -> str:
 def _zenoh(zenoh: Zenoh | None) -> Iterator[Finding]:
     settings = zenoh or Zenoh()
     do = f"certificates for every node, and connect: [tls/…]: {PAGE}"
-    open_ends = [end for end in settings.connect if not end.startswith(ENCRYPTED)]
+    heard = settings.listen if mode(settings) == "peer" else ()
+    ends = [*settings.connect, *(end for end in heard if not is_local(end))]
+    open_ends = [end for end in ends if not end.startswith(ENCRYPTED)]
     if open_ends:
         means = "anybody on the path can read and forge every request, and read any password"
         yield warning(GRAPH, f"not encrypted: {', '.join(open_ends)}", means, do)
@@ -220,16 +225,16 @@ def _files(config: Config, machine: Machine) -> Iterator[Finding]:
                 FILES, f"owner and mode of {path}: {error.strerror}", do="run doctor with sudo"
             )
             continue
-        mode = found.st_mode
+        bits = found.st_mode
         if path not in secrets and found.st_uid != machine.root_uid:
             bad += 1
             means = f"the user with the number {found.st_uid} can change it"
             yield wrong(FILES, f"{path} does not belong to root", means, f"chown root {path}")
-        if mode & forbidden:
+        if bits & forbidden:
             bad += 1
             means = "another user can read it" if path in secrets else "another user can change it"
             right = "600" if path in secrets else "go-w"
-            yield wrong(FILES, f"{path} has mode {mode & 0o777:o}", means, f"chmod {right} {path}")
+            yield wrong(FILES, f"{path} has mode {bits & 0o777:o}", means, f"chmod {right} {path}")
     if not bad:
         yield ok(FILES, "the YAML and its files belong to root, and are closed to other users")
 
@@ -251,13 +256,13 @@ def _logins(said: str | None, there: bool) -> Finding:
         return ok(USERS, "nobody logs in over SSH: sshd is not installed")
     if said is None:
         return unknown(USERS, "sshd's settings cannot be read", do="run doctor with sudo")
-    lines = said.lower().splitlines()
-    found = [
-        line for line in ("passwordauthentication yes", "permitrootlogin yes") if line in lines
-    ]
+    settings = dict(line.split(" ", 1) for line in said.lower().splitlines() if " " in line)
+    if any(key not in settings for key in LOGINS):
+        return unknown(USERS, "sshd does not tell how people log in")
+    found = [f"{key} {settings[key]}" for key in LOGINS if settings[key] != "no"]
     if not found:
         return ok(USERS, "people log in with keys, and not as root")
-    means = "whoever guesses a password has this machine"
+    means = "whoever guesses a password, or has root's key, has this machine"
     return warning(USERS, f"sshd: {', '.join(found)}", means, f"the file of {PAGE}")
 
 

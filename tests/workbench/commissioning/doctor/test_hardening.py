@@ -86,6 +86,19 @@ def test_a_machine_that_shows_nothing_is_unknown_and_never_well(made: MadeUp) ->
         ("{transport: zenoh, zenoh: {connect: [tls/rmf:7447]}}", ["warning", "unknown"]),
         (TLS, ["ok", "unknown"]),
         (TLS.replace("tls/rmf:7447", "tls/rmf:7447, tcp/spare:7447"), ["warning", "unknown"]),
+        *(
+            (
+                TLS.replace("connect:", f"mode: {mode}, listen: [{listen}], connect:"),
+                [level, "unknown"],
+            )
+            for mode, listen, level in (
+                ("peer", "tcp/0.0.0.0:7448", "warning"),
+                ("peer", "tls/0.0.0.0:7448", "ok"),
+                ("peer", "tcp/127.0.0.1:0", "ok"),
+                ("auto", "tcp/0.0.0.0:7448", "warning"),
+                ("client", "tcp/0.0.0.0:7448", "ok"),
+            )
+        ),
         ("{transport: ros2}", ["unknown"]),
         ("{transport: auto}", ["warning", "unknown"]),
     ],
@@ -247,13 +260,17 @@ def test_a_daemon_needs_a_user_of_its_own(made: MadeUp, user: str, wanted: str) 
 @pytest.mark.parametrize(
     ("said", "wanted"),
     [
-        ("permitrootlogin no\npasswordauthentication no\n", "ok"),
-        ("permitrootlogin no\npasswordauthentication yes\n", "warning"),
-        ("permitrootlogin yes\npasswordauthentication no\n", "warning"),
+        ("no no no", "ok"),
+        ("yes no no", "warning"),
+        ("no yes no", "warning"),
+        ("no no yes", "warning"),
+        ("no no without-password", "warning"),
+        ("no no", "unknown"),
     ],
 )
 def test_people_log_in_with_keys(made: MadeUp, said: str, wanted: str) -> None:
-    made.command("sshd", said)
+    settings = zip(points.LOGINS, said.split(), strict=False)
+    made.command("sshd", "".join(f"{key} {value}\n" for key, value in settings))
     assert levels(made, points.USERS)[1] == wanted
 
 
