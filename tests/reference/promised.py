@@ -1,4 +1,5 @@
-"""The names on which users rely: YAML keys, commands, options, exit codes, JSON, topics and faults.
+"""The names on which users rely: YAML keys, commands, options, exit codes, JSON, topics, faults and
+metrics.
 
 `promised.txt` has one name in each line. Within a major version no line is removed. `make reference`
 adds new lines.
@@ -14,13 +15,18 @@ import msgspec
 from bridges import cli
 from bridges.exit_codes import EXIT_CODES
 from bridges.messages import topics
+from bridges.observe.all_devices import PlainGraph
+from bridges.observe.requesters import Moment
+from bridges.observe.tally import SiteTally
 from bridges.runtime import faults
 from bridges.runtime.daemons import DaemonStatus
 from bridges.settings.sheets.findings import Findings
+from bridges.system.certificates import CertificateReader
 from workbench.commissioning import json_schema
 from workbench.commissioning.doctor.finding import Finding
 from workbench.explain.explanation import Explanation
 from workbench.graph.board import BoardRow
+from workbench.metrics import families, machine
 
 JSON: Final = {
     "check": Findings,
@@ -31,6 +37,8 @@ JSON: Final = {
 }
 """The struct that each command prints with `--json`. `judge`, `replay` and `log` have no struct
 here."""
+ENDINGS: Final = {"counter": "_total", "info": "_info"}
+"""What Prometheus' text format adds to the name of a metric of this type."""
 FILE: Final = Path(__file__).with_suffix(".txt")
 
 
@@ -47,7 +55,22 @@ def present() -> set[str]:
     told = {f"json {name} {path}" for name, shape in JSON.items() for path in _fields(shape)}
     ours = {f"topic {topic.name}" for topic in topics.every()}
     codes |= {f"fault {code}" for code in faults.remedies()}
-    return keys | codes | told | ours | set(_options(cli.whole_parser(), "rmf-bridge"))
+    return keys | codes | told | ours | {*_metrics(), *_options(cli.whole_parser(), "rmf-bridge")}
+
+
+def _metrics() -> Iterator[str]:
+    """Yield a line for each metric of the exporter, and for each of its labels."""
+    found = [
+        *families.of_graph(PlainGraph(), SiteTally(), Moment(0.0, 0.0)),
+        *machine.of_machine(()),
+        *machine.of_certificates((), (), CertificateReader().end),
+        *machine.of_recordings(Path(__file__).parent),
+    ]
+    for family in found:
+        name = family.name + ENDINGS.get(family.type, "")
+        yield f"metric {name}"
+        labels: tuple[str, ...] = getattr(family, "_labelnames", ())
+        yield from (f"metric {name} {label}" for label in labels)
 
 
 def _fields(shape: type) -> Iterator[str]:
