@@ -57,7 +57,8 @@ def run(args: argparse.Namespace) -> int:
         return os.EX_UNAVAILABLE
     if args.anonymous:
         of_workbench("workbench.replay.anonymous")  # a missing workbench must fail before the wait
-    path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
+    name = "anonymous" if args.anonymous else args.file.stem
+    path = args.output or Path(f"{name}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
     if why := no_folder(path):
         return not_written(path, why)
     try:

@@ -7,8 +7,8 @@ messages, memories, notes and the YAML, also inside longer texts. The new names 
 as the old names, because cores sort by names.
 
 The program's own words stay, because new words would change the recording. These words are keys and
-values of the YAML, words of a core, and topics. The YAML's comments are removed. The addresses of the
-YAML's buses become `192.0.2.1`, also in the texts of errors.
+values of the YAML, words of a core, and topics. The YAML's comments are removed. The YAML's path
+becomes `/anonymous.yaml`, and the addresses of its buses become `192.0.2.1`, also in longer texts.
 """
 
 import enum
@@ -19,6 +19,7 @@ import typing
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 from urllib.parse import urlsplit
@@ -57,6 +58,7 @@ SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", 
 """Fields in which a core writes its own words, so that they contain no names."""
 NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")
 ADDRESS: Final = "192.0.2.1"
+ANONYMOUS: Final = "/anonymous.yaml"
 HOSTS: Final = ("host", "api_base", "url")
 
 Swap = Callable[[str], str]
@@ -67,11 +69,13 @@ def anonymous(incident: Incident) -> Incident:
     YAML."""
     config = of_head(incident.head)
     content = yaml.safe_load(incident.head.yaml)
-    own = {*_subjects(incident), *_own_names(config, content)}
+    file = incident.head.file
+    own = {Path(file).stem, *_subjects(incident), *_own_names(config, content)}
     whole = {*own, *_spoken_names(incident), *_remembered(incident)}
     found = {part for name in whole for part in name.split("/")}
     hosts = {_host(bus[key]): ADDRESS for bus, key in _addresses(content.get("buses", {}))}
-    swap = _swap(sorted(found - our_words() - {"", *hosts}, key=_longest_first), hosts)
+    places = {**hosts, **({file: ANONYMOUS} if file else {})}
+    swap = _swap(sorted(found - our_words() - {"", *places}, key=_longest_first), places)
     return Incident(
         _head(incident.head, content, swap),
         [_entry(entry, swap) for entry in incident.entries],
@@ -83,14 +87,12 @@ def _longest_first(name: str) -> tuple[int, str]:
     return -len(name), name
 
 
-def _swap(names: list[str], hosts: Mapping[str, str]) -> Swap:
-    """Return a function that replaces names and hosts in a text. A name may be only a part of the text.
-    The longest name is replaced first."""
-    if not names and not hosts:
-        return lambda text: text
+def _swap(names: list[str], places: Mapping[str, str]) -> Swap:
+    """Return a function that replaces names and places in a text. `places` maps a host or path to its
+    replacement. A name may be only a part of the text. The longest name is replaced first."""
     width = len(str(len(names)))
     aliases = {name: f"name{number:0{width}}" for number, name in enumerate(sorted(names), 1)}
-    aliases |= hosts
+    aliases |= places
     every = sorted(aliases, key=_longest_first)
     pattern = re.compile(r"(?<!\w)(?:" + "|".join(map(re.escape, every)) + r")(?!\w)")
     return lambda text: pattern.sub(lambda match: aliases[match[0]], text)
@@ -223,7 +225,7 @@ def _head(head: Head, content: dict[str, Any], swap: Swap) -> Head:
         bus[key] = f"http://{ADDRESS}" if "://" in bus[key] else ADDRESS
     content.get("rmf", {}).pop("zenoh", None)
     text = yaml.safe_dump(_swapped(content, swap), sort_keys=False, allow_unicode=True)
-    return replace(head, yaml=text.encode(), file="/anonymous.yaml")
+    return replace(head, yaml=text.encode(), file=ANONYMOUS)
 
 
 def _addresses(part: object) -> Iterator[tuple[dict[str, Any], str]]:

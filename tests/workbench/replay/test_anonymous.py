@@ -80,8 +80,10 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
 def test_the_codes_of_faults_and_the_keys_of_diagnostics_stay() -> None:
     """Otherwise `explain` would have no remedy, and a replay would show other faults."""
     yaml = (CONFIG / "lift_dry_contact.yaml").read_bytes()
-    head = Head("r", 1, "1", "lift", "/d.yaml", yaml, {}, False, {}, RecordingSettings())
-    fault = {"faults": [{"code": "OVERLOAD", "detail": "Lift1 waits for joe"}], "session": "joe"}
+    file = "/home/mary/east.yaml"
+    head = Head("r", 1, "1", "lift", file, yaml, {}, False, {}, RecordingSettings())
+    detail = f"Lift1 waits for joe, enable {file}, /run/east/status"
+    fault = {"faults": [{"code": "OVERLOAD", "detail": detail}], "session": "joe"}
     said = diagnosis("rmf_bridge_mary", "lift", {}, {"Lift1": fault}, Time(1))
     entry = _spoken(LiftState(lift_name="Lift1", session_id="joe")), _spoken(said)
     told = anonymous(Incident(head, [*entry])).entries[1]
@@ -93,8 +95,11 @@ def test_the_codes_of_faults_and_the_keys_of_diagnostics_stay() -> None:
     assert device.name == f"{daemon.hardware_id}: {name}"
     values = {value.key: value.value for value in device.values}
     who = values["session"]
-    assert values == {"kind": "lift", "OVERLOAD": f"{name} waits for {who}", "session": who}
-    assert {daemon.hardware_id, name, who}.isdisjoint({"rmf_bridge_mary", "Lift1", "joe"})
+    stem = values["OVERLOAD"].split("/")[3]
+    said_of = f"{name} waits for {who}, enable /anonymous.yaml, /run/{stem}/status"
+    assert values == {"kind": "lift", "OVERLOAD": said_of, "session": who}
+    real = {"rmf_bridge_mary", "Lift1", "joe", "east"}
+    assert {daemon.hardware_id, name, who, stem}.isdisjoint(real)
 
 
 def test_the_host_of_a_bus_is_hidden_in_the_texts_of_errors_too() -> None:
