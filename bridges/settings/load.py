@@ -54,7 +54,7 @@ from bridges.yaml.values import BROKEN, Broken, Values, field_names
 from drivers.driver_type import AnyDriver
 from drivers.hal.points import Wire
 
-__all__ = ["Config", "Problem", "SettingsError", "load"]
+__all__ = ["Config", "Problem", "SettingsError", "load", "load_rmf"]
 
 TOPICS = [topic.name for topic in topics.every()]
 OF_RMF: Final = {
@@ -79,6 +79,19 @@ def understood(path: Path | str, text: bytes) -> Config:
     reading.all()
     page.check()
     return reading.config(Path(path), text, old)
+
+
+def load_rmf(path: Path | str) -> Rmf:
+    """Return the section `rmf` of a file for a command that only joins the graph. The file is a device
+    YAML, or has only this section. Raises SettingsError."""
+    text = read(str(path))
+    page = YamlFile(str(path))
+    root = compose(page, text)
+    if [key.value for key, _ in root.value] != ["rmf"]:
+        return understood(path, text).rmf
+    rmf = _DeviceReading(page, root).rmf_alone()
+    page.check()
+    return rmf
 
 
 def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
@@ -134,6 +147,12 @@ class _DeviceReading:
             section=self._section,
             recording=self._recording,
         )
+
+    def rmf_alone(self) -> Rmf:
+        """Read the section `rmf` of a file that has no other section."""
+        for entry in self._values.entries(self._top):
+            self._read_rmf(entry.spot())
+        return self._rmf
 
     def all(self) -> None:
         """Read every section. A section is skipped if its meaning depends on an earlier section that is

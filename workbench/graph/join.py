@@ -26,7 +26,7 @@ def add_graph_arguments(parser: argparse.ArgumentParser) -> None:
         "--config",
         type=Path,
         metavar="FILE",
-        help="a device YAML, for its `rmf:` section: routers, certificates, domain",
+        help="a YAML with an `rmf:` section (routers, certificates, domain): a device's, or of its own",
     )
     parser.add_argument(
         "--domain-id", type=_domain, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID, else 0)"
@@ -143,12 +143,13 @@ def graph_of(args: argparse.Namespace, speaks: str) -> str:
 def _configured(file: Path | None) -> Rmf:
     if file is None:
         return Rmf()
-    from bridges.settings.load import SettingsError, load
+    from bridges.settings.load import SettingsError, load_rmf
 
     try:
-        return load(file).rmf
+        return load_rmf(file)
     except SettingsError as error:
-        raise TransportError("\n".join(map(str, error.problems))) from None
+        print(*error.problems, sep="\n", file=sys.stderr)
+        raise TransportError(f"{file} has errors") from None
 
 
 def interruptible() -> AbstractContextManager[None]:
