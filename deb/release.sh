@@ -22,7 +22,7 @@ export SOURCE_DATE_EPOCH
 rm -rf dist build/sdist && mkdir dist
 # tarball FILE FOLDER NAME: packs FOLDER/NAME into FILE. The same content always gives the same bytes.
 tarball() { tar -C "$2" --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" -cf - "$3" | gzip -9n > "$1"; }
-make --no-print-directory deb
+make --no-print-directory reproducible # builds twice, and keeps the first build
 "$bin/python" -m build --no-isolation --sdist --wheel --outdir build/sdist . > build/sdist.log
 tar -C build/sdist -xzf "build/sdist/rmf_bridges-$version.tar.gz"
 tarball "dist/rmf_bridges-$version.tar.gz" build/sdist "rmf_bridges-$version"
@@ -38,6 +38,7 @@ for file in "$PWD/dist/rmf_bridges-$version.tar.gz" "$PWD/dist/rmf_bridges-$vers
   python3 -m venv "$empty"
   "$empty/bin/pip" install --quiet --disable-pip-version-check "$file"
   cp config/lift_dry_contact.yaml "$empty"
+  touch "$empty/run.log"
   (cd "$empty" && unset PYTHONPATH && bin/rmf-bridge --version | grep -qx "rmf-bridge $version" &&
     bin/rmf-bridge check --quiet lift_dry_contact.yaml &&
     timeout --preserve-status -s TERM 10 bin/rmf-bridge run lift_dry_contact.yaml --simulate --runtime-dir "$empty/run" > run.log 2>&1) ||

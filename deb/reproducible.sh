@@ -1,9 +1,10 @@
 #!/bin/sh
 # Builds the packages twice, and compares the two builds: deb/reproducible.sh (`make reproducible`). The second build has
-# another time zone, language, umask and file time, and builds lgpio again. The packages of the first build stay in dist/.
+# another time zone, language, umask and file time, and builds manual, documentation and lgpio again. The packages of the
+# first build stay in dist/.
 set -eu
 cd "$(dirname "$0")/.."
-build() { for arch in ${ARCHS:-amd64 arm64}; do for python in ${PYTHONS:-3.11 3.12 3.13}; do deb/build.sh "$arch" "$python" > /dev/null; done; done; }
+build() { make --no-print-directory man docs > /dev/null; for arch in ${ARCHS:-amd64 arm64}; do for python in ${PYTHONS:-3.11 3.12 3.13}; do deb/build.sh "$arch" "$python" > /dev/null; done; done; }
 sums() { (cd dist && sha256sum -- *.deb *.cdx.json); }
 rm -rf dist build/deb
 build
