@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 
 from bridges import cli
 from bridges.exit_codes import EXIT_CODES
+from bridges.kinds import kind_names
 from tests.reference.pages import DOCS, PAGES
 
 ROOT = DOCS.parent
@@ -30,6 +32,23 @@ def test_each_exit_code_of_a_command_is_documented(command: str) -> None:
     named = {getattr(os, name) for name in re.findall(r"os\.(EX_[A-Z]+)", source)}
     named |= {int(code) for code in re.findall(r"return (\d+)$", source, re.M)}
     assert named - {2} <= EXIT_CODES[command].keys()
+
+
+def test_the_table_of_packages_has_every_command() -> None:
+    text = (DOCS / "how-to/install.md").read_text().partition("| package | has |")[2]
+    daemons, people, page, *_ = (line for line in text.splitlines() if line.startswith("| `"))
+    own, theirs, pages = (
+        {word for words in re.findall(r"`([\w -]+)`", line) for word in words.split()}
+        for line in (daemons, people, page)
+    )
+    assert own & cli.COMMANDS.keys() == cli.COMMANDS.keys() - cli.WORKBENCH
+    assert (theirs | pages | {"page"}) & cli.WORKBENCH == cli.WORKBENCH
+
+
+def test_the_form_of_a_defect_has_every_kind() -> None:
+    form = yaml.safe_load((ROOT / ".github/ISSUE_TEMPLATE/defect.yml").read_text())
+    [options] = [part["attributes"]["options"] for part in form["body"] if part.get("id") == "kind"]
+    assert set(kind_names()) - set(options) == set()
 
 
 def tracked(pattern: str) -> Iterator[Path]:

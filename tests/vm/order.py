@@ -77,8 +77,7 @@ order. A check may need the result of an earlier check."""
 WHOLE: Final = ("lift", "site", "upgrade")
 """The parts that together have every check. They run at the same time."""
 ALSO: Final = {("arm64", "lift"): ("inside.demo", "inside.transport")}
-"""Additional checks for arm64. CI's own machine is an amd64 machine, so arm64 needs these checks
-here."""
+"""Additional checks for arm64, because most contributors' own machines are amd64."""
 NOT_ON: Final = {"arm64": ("network.late",)}
 """Checks that do not run on arm64. In this check on arm64, zenoh would need a router to find another
 machine."""
