@@ -52,8 +52,10 @@ def test_every_output_of_every_kind_and_every_order_has_its_four_rows() -> None:
     assert wanted - {row.id for row in ROWS} == set()
 
 
-def test_each_row_has_its_own_id() -> None:
+def test_each_row_has_its_own_id_with_the_way_in_its_place() -> None:
     assert len({row.id for row in ROWS}) == len(ROWS)
+    form = re.compile(rf"(every|[a-z_]+\.[a-z_]+)\.({'|'.join(WAYS)})(\.[a-z_0-9]+)*")
+    assert [row.id for row in ROWS if not form.fullmatch(row.id)] == []
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.id)
