@@ -177,6 +177,10 @@ def main(argv: list[str] | None = None) -> int:
             parsed.usage(f"unrecognized arguments: {' '.join(unknown)}")
         return int(_module(parsed.command).run(parsed))
     except NotInstalled as error:
+        import logging
+
+        for handler in logging.root.handlers:
+            handler.flush()  # a thread may still write earlier lines, and the reason comes last
         sys.stderr.write(f"rmf-bridge {arguments[0]}: {error}\n")
         return os.EX_UNAVAILABLE
     except BrokenPipeError:  # the program that reads our output, such as `head`, has ended
