@@ -65,7 +65,7 @@ sbom() {
   cp "$doc/sbom.cdx.json" "$here/dist/${package}_${version}_$arch.cdx.json"
 }
 sbom rmf-bridges "$root" "$site"
-sbom rmf-bridges-workbench "$bench" "$in_bench" --with "$("$bin/pip" freeze | grep '^mkdocs-material==')"
+sbom rmf-bridges-workbench "$bench" "$in_bench" --with mkdocs-material
 sbom rmf-bridges-page "$page" "$in_page"
 
 # Make a virtual environment on the system's own Python. The environment sees the system's packages, such as rclpy. postinst

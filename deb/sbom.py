@@ -1,7 +1,8 @@
 """Writes a package's bill of materials (CycloneDX JSON): python deb/sbom.py --help.
 
 The components are the distributions in the package's folders. If a library's wheel has no licence text,
-the text is taken from deb/licences/. If it is not there either, the build fails.
+the text is taken from deb/licences/. If it is not there either, or nothing names the licence, the build
+fails.
 """
 
 import argparse
@@ -10,7 +11,7 @@ import shutil
 import sys
 import uuid
 from collections.abc import Iterator
-from importlib.metadata import Distribution, distributions
+from importlib.metadata import Distribution, distribution, distributions
 from pathlib import Path
 
 from cyclonedx.contrib.license.factories import LicenseFactory
@@ -36,6 +37,11 @@ def main() -> int:
     if unlicensed:
         print(f"no licence text in deb/licences/ for {', '.join(unlicensed)}", file=sys.stderr)
         return 1
+    libraries += map(distribution, args.more)
+    unnamed = [canonicalize_name(one.name) for one in libraries if not any(_licences(one))]
+    if unnamed:
+        print(f"deb/licences/ needs {', '.join(f'{one}.spdx' for one in unnamed)}", file=sys.stderr)
+        return 1
     args.out.write_text(_bom(args, libraries) + "\n")
     return 0
 
@@ -47,7 +53,14 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("arch")
     parser.add_argument("folder", nargs="+", help="a folder of distributions in the package")
     parser.add_argument("--epoch", type=int, required=True, help="the time of the build (s)")
-    parser.add_argument("--with", dest="more", action="append", default=[], metavar="NAME==VERSION")
+    parser.add_argument(
+        "--with",
+        dest="more",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a library of this Python that has left its files in the package",
+    )
     parser.add_argument("--out", type=Path, required=True)
     return parser.parse_args()
 
@@ -76,26 +89,23 @@ def _bom(args: argparse.Namespace, libraries: list[Distribution]) -> str:
     bom.metadata.timestamp = datetime.datetime.fromtimestamp(args.epoch, datetime.UTC)
     bom.metadata.component = top
     parts = [_component(one) for one in libraries]
-    parts += [_part(*pair.split("==")) for pair in args.more]
     bom.components.update(parts)
     bom.register_dependency(top, parts)
     return JsonV1Dot6(bom).output_as_string(indent=1)
 
 
 def _component(library: Distribution) -> Component:
-    part = _part(library.name, library.version)
+    name, version = library.name, library.version
+    purl = PackageURL("pypi", name=canonicalize_name(name), version=version)
+    part = Component(name=name, version=version, purl=purl, bom_ref=str(purl))
     part.licenses.update(_licences(library))
     return part
 
 
-def _part(name: str, version: str) -> Component:
-    purl = PackageURL("pypi", name=canonicalize_name(name), version=version)
-    return Component(name=name, version=version, purl=purl, bom_ref=str(purl))
-
-
 def _licences(library: Distribution) -> Iterator[License]:
     """Yield a library's licences from the first of these sources that exists: our file in
-    deb/licences/, the field License-Expression, the field License, the classifiers."""
+    deb/licences/, the field License-Expression, the field License, the classifiers. Yield nothing if
+    none exists."""
     about, factory = library.metadata, LicenseFactory()
     said = about.get("License-Expression") or about.get("License", "").partition("\n")[0]
     classes = about.get_all("Classifier", [])

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -36,13 +37,19 @@ def test_each_library_is_listed_with_its_version_licence_and_package_url(tmp_pat
     library(site, "rmf_bridges", "License-Expression: Apache-2.0")
     library(site, "one", "License-Expression: MIT", licence="licenses/LICENSE")
     library(site, "two", "License: BSD License", licence="COPYING")
-    bom = written(site, "--with", "theme==9.8")
+    bom = written(site, "--with", "mkdocs-material")
+    theme = version("mkdocs-material")
     assert [
         (part["name"], part["version"], part["purl"], part.get("licenses"))
         for part in bom["components"]
     ] == [
+        (
+            "mkdocs-material",
+            theme,
+            f"pkg:pypi/mkdocs-material@{theme}",
+            [{"license": {"id": "MIT"}}],
+        ),
         ("one", "1.0", "pkg:pypi/one@1.0", [{"license": {"id": "MIT"}}]),
-        ("theme", "9.8", "pkg:pypi/theme@9.8", None),
         ("two", "1.0", "pkg:pypi/two@1.0", [{"license": {"name": "BSD License"}}]),
     ]
     assert bom["bomFormat"] == "CycloneDX"
@@ -50,7 +57,7 @@ def test_each_library_is_listed_with_its_version_licence_and_package_url(tmp_pat
 
 
 def test_the_same_libraries_give_the_same_bytes(tmp_path: Path) -> None:
-    library(tmp_path / "site", "one", licence="LICENSE")
+    library(tmp_path / "site", "one", "License: MIT", licence="LICENSE")
     first = json.dumps(written(tmp_path / "site"))
     assert json.dumps(written(tmp_path / "site")) == first
     assert "2023-11-14T22:13:20" in first
@@ -63,6 +70,15 @@ def test_a_library_without_its_licence_ends_the_build(
     with pytest.raises(subprocess.CalledProcessError):
         written(tmp_path / "site")
     assert capfd.readouterr().err == "no licence text in deb/licences/ for silent\n"
+
+
+def test_a_library_whose_licence_has_no_name_ends_the_build(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    library(tmp_path / "site", "Silent_Two", licence="LICENSE")
+    with pytest.raises(subprocess.CalledProcessError):
+        written(tmp_path / "site")
+    assert capfd.readouterr().err == "deb/licences/ needs silent-two.spdx\n"
 
 
 @pytest.mark.parametrize(
