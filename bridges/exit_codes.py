@@ -62,7 +62,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         78: "a file has an error, or the files contradict each other",
     },
     "migrate": {
-        0: "the file has no old key",
+        0: "the file has no old key, or --dry-run has printed the changes",
         65: "an old key must be changed by hand",
         73: "the file cannot be written",
         **YAML,
