@@ -112,7 +112,9 @@ gzip -9nc "$here/build/rmf-bridge.1" > "$root/usr/share/man/man1/rmf-bridge.1.gz
 "$bin/rmf-bridge" completion fish > "$root/usr/share/fish/vendor_completions.d/rmf-bridge.fish"
 
 mkdir -p "$bench/usr/share/doc/rmf-bridges-workbench"
-cp -R "$here/build/site" "$bench/usr/share/doc/rmf-bridges-workbench/html" # `make docs`
+html=$bench/usr/share/doc/rmf-bridges-workbench/html
+cp -R "$here/build/site" "$html" # `make docs`, perhaps under another umask
+chmod -R u=rwX,go=rX "$html"
 
 # package NAME ROOT DEPENDS SUMMARY [TREE [RECOMMENDS]]: builds a package with control files, changelog, copyright and
 # lintian's overrides.
