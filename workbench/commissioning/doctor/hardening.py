@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from bridges.kinds.shared.rmf_section import Rmf, Zenoh
+from bridges.runtime.services import numbers
 from bridges.settings.config import Config
 from bridges.settings.named_files import CERTIFICATES, SECRETS, named_files
 from bridges.system.directories import SERVICE_USER, user_of
@@ -206,12 +207,14 @@ def _root(mounts: str | None) -> Finding:
 
 def _files(config: Config, machine: Machine) -> Iterator[Finding]:
     """Examine the modes of the YAML, of the YAML's folder, and of each file that the YAML names. All of
-    them but the secrets must belong to root."""
+    them must belong to root, but for the secrets and a YAML that others cannot read: `enable` gives
+    these to the service's user."""
     file = config.path.absolute()
     secrets, readable = (
         list(dict.fromkeys(Path(file) for _, file in named_files(config, keys)))
         for keys in (SECRETS, CERTIFICATES)
     )
+    services_uid = numbers(machine.at("/etc/passwd")).get(user_of(file.stem))
     bad = 0
     for path, forbidden in [
         *((one, OTHERS_WRITE) for one in (file.parent, file, *readable)),
@@ -225,8 +228,10 @@ def _files(config: Config, machine: Machine) -> Iterator[Finding]:
                 FILES, f"owner and mode of {path}: {error.strerror}", do="run doctor with sudo"
             )
             continue
-        bits = found.st_mode
-        if path not in secrets and found.st_uid != machine.root_uid:
+        bits, owners = found.st_mode, [machine.root_uid]
+        if path == file and not bits & stat.S_IROTH and services_uid is not None:
+            owners.append(services_uid)
+        if path not in secrets and found.st_uid not in owners:
             bad += 1
             means = f"the user with the number {found.st_uid} can change it"
             yield wrong(FILES, f"{path} does not belong to root", means, f"chown root {path}")

@@ -249,6 +249,20 @@ def test_files_are_judged_by_their_modes_and_owners(made: MadeUp) -> None:
 
 
 @pytest.mark.parametrize(
+    ("user", "mode", "well"),
+    [(user_of("lift"), 0o600, True), (user_of("lift"), 0o644, False), ("pi", 0o600, False)],
+)
+def test_a_yaml_that_others_cannot_read_may_belong_to_the_services_user(
+    made: MadeUp, user: str, mode: int, well: bool
+) -> None:
+    made.write("/etc/passwd", f"{user}:x:{os.geteuid()}:1::/:/bin/false\n")
+    made.write("/etc/rmf-bridges/lift.yaml", mode=mode)
+    made.machine = replace(made.machine, root_uid=os.geteuid() + 1)
+    wrong = ("wrong", "/etc/rmf-bridges/lift.yaml does not belong to root")
+    assert (wrong not in found(made, points.FILES)) == well
+
+
+@pytest.mark.parametrize(
     ("user", "wanted"),
     [(user_of("lift"), "ok"), ("rmf-bridge", "warning"), ("root", "wrong"), ("", "wrong")],
 )
