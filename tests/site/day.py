@@ -201,6 +201,7 @@ class Site:
             robot.goes_out()
 
     def _look(self, hour: float, told: Callable[[Look], None]) -> None:
+        self.air.forget_links()
         self.looks.append(look(hour))
         told(self.looks[-1])
 

@@ -131,6 +131,12 @@ class Air:
         if not delays:
             self.counts["lost"] += 1
 
+    def forget_links(self) -> None:
+        """Forget the links whose samples have all arrived, because in a hospital their number grows for
+        hours. A later sample cannot overtake them any more."""
+        now = self.timeline.now
+        self._arrived = {link: at for link, at in self._arrived.items() if at > now}
+
     def _found_again(self, name: str, lost: bool) -> None:
         if self._cut.get(name, NEVER) > self.timeline.now:
             return
