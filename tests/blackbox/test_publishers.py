@@ -73,4 +73,4 @@ def test_an_anonymous_recording_names_no_node() -> None:
     told = anonymous(Incident(HEAD, [said("/saint_marys/lift_north", lift="lift_north")]))
     [spoken] = told.entries
     assert isinstance(spoken, Spoken)
-    assert spoken.node == "/name2/name1"
+    assert spoken.node == "/name3/name2"  # name1 is the YAML
