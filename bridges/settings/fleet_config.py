@@ -62,8 +62,8 @@ class OlderRobot(msgspec.Struct, frozen=True):
 
 
 class FinishingTask(msgspec.Struct, frozen=True):
-    """What a robot does after a task, if it is written as a mapping. `waypoint_name`: where this robot
-    parks. RMF reads it for the type park alone."""
+    """A `finishing_request` in the form of a mapping. `waypoint_name`: where the robot parks; RMF reads
+    it only for the type park."""
 
     type: str
     waypoint_name: str | None = None

@@ -160,8 +160,7 @@ def _not_in_graph(waypoint: str, known: Sequence[str]) -> str:
 
 
 def _misspelt(fleet: FleetFile) -> Iterator[str]:
-    """Yield a text for each key that RMF's adapter does not read, and that looks like one that it
-    reads."""
+    """Yield a text for each key that is probably a misspelt key of RMF's adapter."""
     robots = [path for path, _, _ in fleet.robots()]
     for path, known in ((("rmf_fleet",), READ), *((path, READ_OF_ROBOT) for path in robots)):
         section = locate(Spot(fleet.root, fleet.root, "the file"), path).value

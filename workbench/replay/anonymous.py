@@ -93,6 +93,8 @@ def _swap(names: list[str], places: Mapping[str, str]) -> Swap:
     width = len(str(len(names)))
     aliases = {name: f"name{number:0{width}}" for number, name in enumerate(sorted(names), 1)}
     aliases |= places
+    if not aliases:
+        return lambda text: text
     every = sorted(aliases, key=_longest_first)
     pattern = re.compile(r"(?<!\w)(?:" + "|".join(map(re.escape, every)) + r")(?!\w)")
     return lambda text: pattern.sub(lambda match: aliases[match[0]], text)

@@ -134,3 +134,10 @@ def _spoken(said: LiftState | DiagnosticArray) -> Spoken:
     if isinstance(said, DiagnosticArray):
         topic, kind = "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"
     return Spoken(1.0, True, topic, kind, "kilted", told)
+
+
+def test_a_recording_without_names_and_path_stays_as_it_is() -> None:
+    yaml = b"kind: lift_supervisor\n"
+    head = Head("r", 1, "1", "lift_supervisor", "", yaml, {}, False, {}, RecordingSettings())
+    told = anonymous(Incident(head, [DaemonDied(1.0, "no answer: a bus")]))
+    assert (told.head.yaml, told.entries) == (yaml, [DaemonDied(1.0, "no answer: a bus")])
