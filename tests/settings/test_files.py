@@ -35,7 +35,9 @@ def test_a_pipe_and_a_device_and_a_socket_are_one_problem_without_a_wait(tmp_pat
 
 
 def test_a_name_that_no_file_can_have_is_one_problem() -> None:
-    assert why_not(Path("a\0b"))[0].startswith("1:1: cannot be read: embedded null")
+    said = why_not(Path("a\0b"))[0]
+    assert said.startswith("1:1: cannot be read: ")
+    assert "embedded null" in said  # the rest of the text depends on Python's version
 
 
 def test_a_file_longer_than_any_device_yaml_is_not_read(file: Path) -> None:
