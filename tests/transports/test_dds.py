@@ -140,6 +140,13 @@ def test_a_node_keeps_its_name_however_many_have_left_the_graph_since(
     assert sorted(subscription.senders()) == ["/last", "/there"]
 
 
+def test_a_node_that_has_left_reads_nobodys_name(join_dds: Join) -> None:
+    """Another thread may still ask for a sender while the node deletes its readers."""
+    node: Any = join_dds("here")
+    node.close()
+    assert node._owners([bytes(16)]) == []
+
+
 def test_a_peer_with_another_type_is_named_once(
     join_dds: Join, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -157,7 +164,8 @@ def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fleet adapter appears while our node subscribes. The adapter has another release than our
-    default, so the subscription must change to the adapter's release."""
+    default, so the subscription must change to the adapter's release. The node's own thread makes this
+    change, as always: cyclonedds crashes if one thread deletes a reader while another thread reads."""
     create, heard = (
         DdsSubscription.create,
         Announced(
@@ -167,17 +175,27 @@ def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
     assert type_hash(d.FleetState, DEFAULT) != heard.hash
     adapter = DdsTransport("fleet_adapter", domain, loopback=True, release=NEWEST)
     node = DdsTransport("coordinator", domain, loopback=True)
+    follow, following = node._follow_release, list[bool]()
+
+    def follow_noted() -> None:
+        following.append(True)
+        follow()
+        following.clear()
+
     with closing(adapter), closing(node):
 
         def found_meanwhile(*given: Any) -> Any:
             monkeypatch.undo()
             node._peers.seen("an adapter", heard)
-            thread = threading.Thread(target=node._follow_release)
-            thread.start()
-            # The thread must wait until `create` returns. Otherwise it ends within this time.
-            thread.join(timeout=0.2)
+            with monkeypatch.context() as news:
+                news.setattr(node._dds_peers, "look", lambda: True)
+                node._wake()
+                # The node's thread must wait until `create` returns. Otherwise it soon goes on.
+                wait_until(lambda: following, "the node's thread follows the release")
+                threading.Event().wait(0.2)
             return create(*given)
 
+        node._follow_release = follow_noted  # type: ignore[method-assign]
         monkeypatch.setattr(DdsSubscription, "create", found_meanwhile)
         subscription = node.subscribe(FLEET_STATES, lambda state: None)
         adapter.publisher(FLEET_STATES)

@@ -43,6 +43,10 @@ class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TI
     cyclonedds reads the QoS of each announcement into the same variables (11.0.1, qos._CQos._gc_*). If
     two threads read at the same time, an end gets another end's user data. This can happen, because a
     process may have several nodes, each with its own thread.
+
+    Only the thread that reads may delete the reader, or another thread after the reading thread's end.
+    Otherwise the process may end by a segmentation fault (11.0.1, clayer/pysertype.c: the samples that
+    `take` still reads belong to the reader).
     """
 
     def take(self, count: int) -> list[Any]:

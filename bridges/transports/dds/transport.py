@@ -252,7 +252,7 @@ class DdsTransport(Threaded):
 
     def _owners(self, writers: list[bytes]) -> list[str]:
         with self._lock:
-            if not self._joined:
+            if self._closed or not self._joined:
                 return []
             if self._node.reader is None:
                 self._keep(self._node.listen())
