@@ -15,9 +15,10 @@ PATIENCE_S = 120.0
 
 TOO_LATE = re.compile(
     r" within [\d.]+ s\b|first bytes are not the echo|echo came late|is half a frame"
-    r"|is not a frame: a collision"
+    r"|is not a frame: a collision|has come on .+ since the connection began"
 )
-"""Error texts of a bus whose answer came late, or of a serial line on which two answers collided."""
+"""Error texts of a bus whose answer or first message came late, or of a serial line on which two
+answers collided."""
 
 LEASE_S = 9.5
 """A wait (s) slightly shorter than the lease, which is 10 s. After the lease, DDS removes a node that

@@ -46,6 +46,24 @@ def test_nodes_that_come_and_go_leave_no_thread_no_file_and_no_complaint_behind(
     assert caplog.messages == []
 
 
+def test_a_node_leaves_the_graph_at_the_end_of_a_process_that_can_start_no_thread(
+    join_any_wire: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python 3.12.0 and 3.12.1 start no thread in an atexit callback."""
+
+    def start(thread: threading.Thread) -> None:
+        raise RuntimeError("can't create new thread at interpreter shutdown")
+
+    stays, leaves = join_any_wire("stays"), join_any_wire("leaves")
+    subscription = stays.subscribe(LIFT_STATES, print)
+    leaves.publisher(LIFT_STATES)
+    wait_until(subscription.matched, "the publisher is found")
+    monkeypatch.setattr(threading.Thread, "start", start)
+    leaves.close()
+    monkeypatch.undo()
+    wait_until(lambda: subscription.matched() == 0, "the publisher has gone")
+
+
 def test_a_peer_whose_durability_does_not_fit_is_named_once(
     join_any_wire: Join, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -244,8 +244,12 @@ class ZenohTransport(Threaded):
         if session:
             held += [self._presence, self._events, self._witnesses]
             closing = threading.Thread(target=closed, args=(session, held), daemon=True)
-            closing.start()
-            self._closing.append(closing)
+            try:
+                closing.start()
+            except RuntimeError:  # Python 3.12.0 and 3.12.1 start no thread in an atexit callback
+                closed(session, held)
+            else:
+                self._closing.append(closing)
 
     def _join_anew(self) -> None:
         with self._lock:
