@@ -337,6 +337,8 @@ def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | N
     holder = memory.holder
     if rivalled(memory, now) or memory.protection or (holder and holder.over):
         return False
+    if sensing.shows_fault(memory):
+        return False
     if unreachable(memory, limits):
         return None
     assert memory.sample
@@ -344,9 +346,8 @@ def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | N
         return False
     if holder is None:
         return None if pad.left_alone(memory, limits) else False
-    if pad.not_ready(memory.sample) or sensing.shows_fault(memory):
+    if pad.not_ready(memory.sample):
         return False
-    if holder.started:
-        return True
-    may_begin = memory.power or not memory.misses
-    return bool(may_begin and session.cleared_to_start(memory, limits))
+    if memory.misses and memory.power is False:
+        return False  # only a good reading switches on again
+    return holder.started or session.cleared_to_start(memory, limits)

@@ -78,7 +78,7 @@ def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLi
         return memory.with_grant(name, None)
     if grant.shown and seen.diagnosis is FaultCause.LOST:
         return memory
-    if grant.shown and not _forgot(memory, name, grant, now, site):
+    if (grant.shown or grant.started) and not _forgot(memory, name, grant, now, site):
         return _ended(memory.with_grant(name, None), name, grant, now, site)
     return memory.with_grant(name, _repeated(grant, seen, now))
 

@@ -15,6 +15,8 @@ DOOR-SUPERVISOR-2. When the first holder comes, the supervisor sends OPEN to the
      or MOVING.
    - For INSIST_S after a holder has come, OPEN is repeated at every state of the door. The first OPEN
      may have been lost, or an earlier CLOSE may be about to close the door.
+   - OPEN is repeated when a held door comes back from OFFLINE, UNKNOWN or a silence, because the
+     door's node may have let the door go meanwhile, as in a fire.
    - In the states OFFLINE and UNKNOWN no request is repeated because of the state.
 DOOR-SUPERVISOR-3. Silence ends no hold, because a robot in the doorway is silent. After `open_alarm_s`
    a fault is shown, and the door stays open.
@@ -44,15 +46,16 @@ from bridges.kinds.door_supervisor.signals import (
     RequesterOpens,
 )
 from bridges.kinds.shared.decision import Decision, Said
-from bridges.kinds.shared.durations import FORGOTTEN_S, NEVER, due_at
+from bridges.kinds.shared.durations import FORGOTTEN_S, NEVER, SILENT_S, due_at
 from bridges.kinds.shared.freshness import Rules, hear
 from bridges.kinds.shared.graph_kind import MaySpeak
-from bridges.messages.definitions import DoorMode, DoorRequest
+from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest
 from bridges.messages.topics import DOOR_REQUESTS
 
 REQUESTER_ID: Final = "door_supervisor"
 """The requester_id of RMF's own door supervisor (door_supervisor/Node.hpp)."""
 INSIST_S: Final = 5.0
+UNSURE: Final = (DoorModeValue.MODE_OFFLINE, DoorModeValue.MODE_UNKNOWN)
 RULES: Final = Rules(retained=False)
 
 Decided = Decision[SupervisedDoor, None, DoorHoldReport]
@@ -102,7 +105,8 @@ def _take(memory: SupervisedDoor, event: Event, now: float) -> tuple[SupervisedD
         case RequesterOpens() | RequesterCloses():
             return _hear(memory, event, now)
         case DoorStateHeard(mode):
-            return _see(replace(memory, mode=mode, shown_at=now), now), ""
+            returns = memory.mode in UNSURE or now >= memory.shown_at + SILENT_S
+            return _see(replace(memory, mode=mode, shown_at=now), now, returns), ""
         case MaySpeak(yes, at_once, waits=passive):
             memory = replace(memory, may_speak=yes, at_once=at_once, passive=passive)
             return replace(memory, sent=None, prompted=False), ""
@@ -135,10 +139,13 @@ def _enter(memory: SupervisedDoor, event: RequesterOpens, now: float) -> Supervi
     return replace(memory, holders=holders, prompted=True)
 
 
-def _see(memory: SupervisedDoor, now: float) -> SupervisedDoor:
-    """Decide after a new state of the door whether the last request must be repeated."""
+def _see(memory: SupervisedDoor, now: float, returns: bool) -> SupervisedDoor:
+    """Decide after a new state of the door whether the last request must be repeated. A repeat that a
+    requester has asked for, and that is not due yet, stays. `returns`: the door comes back from a state
+    in which it may have ended the hold."""
     insists = any(now < holder.since + INSIST_S for holder in memory.holders)
-    return replace(memory, prompted=memory.disagrees or insists)
+    repeats = memory.holders and memory.mode not in UNSURE and (memory.prompted or returns)
+    return replace(memory, prompted=bool(memory.disagrees or insists or repeats))
 
 
 # --- messages that go out -----------------------------------------------------------------------

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from bridges.kinds.charger.memory import ChargerLimits
 from bridges.kinds.charger.settings import ChargerDurations
 from bridges.kinds.shared.debounce import RESTLESS_S
-from bridges.kinds.shared.decision import Sampled
+from bridges.kinds.shared.decision import RivalSeen, Sampled
 from bridges.settings.load import load
 from drivers.charger.dry_contact import debounce, decode
 from tests.kinds.charger.story import AMR1, AMR2, RESET, SILENT, Story
@@ -144,6 +144,38 @@ def test_the_power_is_off_in_the_scan_that_reads_a_danger(contact: dict[str, boo
 
 
 # ---- CHARGER-SENSING-3: the pad leaves its height under power
+
+
+@pytest.mark.parametrize("lost_for", [1, 5])
+def test_a_failed_poll_after_a_danger_switches_nothing_on_again(lost_for: int) -> None:
+    it = charging()
+    for _ in range(3):
+        it.event(Sampled(decode({**GOOD, "charging": True, "fault": True}, True)))
+        orders = [it.outputs.power]
+        for _ in range(lost_for):
+            it.now += 0.05
+            it.event(SILENT)
+            orders.append(it.outputs.power)
+        assert orders[0] is False
+        assert True not in orders
+
+
+def test_a_failed_poll_after_a_rival_has_gone_switches_nothing_on_again() -> None:
+    it = charging()
+    it.event(RivalSeen())
+    assert it.outputs.power is False
+    it.now += 3.0
+    it.event(SILENT)
+    it.now += 3.0
+    it.event(SILENT)
+    assert it.outputs.power is False
+
+
+def test_a_fault_in_the_first_reading_after_a_silence_is_off_before_it_settles() -> None:
+    it = charging()
+    it.all([SILENT] * 3)
+    it.event(Sampled(decode({**GOOD, "charging": True, "fault": True}, True)))
+    assert it.outputs.power is False
 
 
 def test_a_lost_height_is_a_fault_although_the_power_ended_the_charge_before_it_counted() -> None:

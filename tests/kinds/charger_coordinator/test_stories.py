@@ -213,6 +213,23 @@ def test_a_robot_that_fails_at_a_second_station_is_not_tried_a_third_time() -> N
 # ---- COORDINATOR-6, COORDINATOR-7, COORDINATOR-STATIONS-1: restarts and rivals
 
 
+def test_a_charge_that_ended_while_the_coordinator_was_away_is_not_requested_again() -> None:
+    site = Yard(site=settings(start_timeout_s=300.0), finishing="nothing")
+    site.run(5.0)
+    site.wants("AMR01")
+    site.fleet.strays("AMR01", "charger_a", site.now)
+    site.fleet.robots["AMR01"].battery_percent = 60.0
+    site.run(14.0)
+    assert site.mode("charger_a") == "CHARGING"
+    site.coordinator.leave()
+    site.run(25.0)
+    site.fleet.works("AMR01", "ward", site.now)
+    site.run(40.0)
+    site.coordinator.restart()
+    site.run(100.0)
+    assert (site.mode("charger_b"), site.faults) == ("IDLE", [])
+
+
 def test_a_restart_keeps_the_queue_and_touches_no_charge_under_way() -> None:
     site = yard(fills=1.0)
     for who in ("AMR01", "AMR02", "AMR03"):

@@ -61,6 +61,31 @@ def test_repeats_of_a_requester_are_passed_on_at_most_once_a_second() -> None:
     assert desk.sent == [(0.0, "OPEN"), (1.0, "OPEN"), (2.0, "OPEN"), (3.0, "OPEN")]
 
 
+def test_a_state_before_the_repeat_is_due_does_not_cancel_the_repeat_of_a_requester() -> None:
+    desk = Alone()
+    desk.opens()
+    desk.shows("OPEN", until=8.0)
+    desk.opens()
+    desk.until(8.5)
+    desk.opens()
+    desk.shows("OPEN")
+    desk.until(20.0)
+    assert desk.sent[-2:] == [(8.0, "OPEN"), (9.0, "OPEN")]
+
+
+@pytest.mark.parametrize("mode", ["OFFLINE", "UNKNOWN", None])
+def test_open_is_repeated_once_when_a_held_door_comes_back(mode: str | None) -> None:
+    """Its node may have let the door go in a fire, while a person kept the leaf open."""
+    desk = Alone()
+    desk.opens()
+    desk.shows("OPEN", until=8.0)
+    if mode:
+        desk.shows(mode, until=12.0)
+    desk.until(12.5)
+    desk.shows("OPEN", until=20.0)
+    assert desk.sent[-2:] == [(5.0, "OPEN"), (12.5, "OPEN")]
+
+
 @pytest.mark.parametrize("mode", ["CLOSED", "MOVING"])
 def test_open_is_repeated_at_each_state_of_a_held_door_that_is_not_open(mode: str) -> None:
     desk = Alone()
