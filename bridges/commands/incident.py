@@ -12,11 +12,11 @@ from bridges.blackbox.incident import AFTER_S, BEFORE_S, INSTALL, Incident, Note
 from bridges.blackbox.ring import DIED, NAME, RingContent, RingError
 from bridges.blackbox.triggers import OPERATOR, death
 from bridges.runtime import holder
-from bridges.runtime.clock import machine_s
 from bridges.runtime.runtime_directory import find
 from bridges.settings.load import SettingsError
 from bridges.system.directories import Directories
 from bridges.system.installed import of_workbench
+from bridges.system.machine_time import machine_s
 from bridges.system.written import no_folder, not_written
 
 

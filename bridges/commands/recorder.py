@@ -15,10 +15,10 @@ from bridges.blackbox.incident import INSTALL
 from bridges.blackbox.recorder import Recorder
 from bridges.blackbox.recordings import Recordings
 from bridges.runtime import signals
-from bridges.runtime.clock import machine_s
 from bridges.runtime.notify import notify
 from bridges.system import directories, log
 from bridges.system.columns import aligned
+from bridges.system.machine_time import machine_s
 
 EVERY_S = 1.0
 SERVICE = Path("/var/lib/rmf-bridge-recorder")

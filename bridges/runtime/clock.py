@@ -1,7 +1,6 @@
 """The clocks of a daemon, and the times at which it publishes a message. A state is published each
 second, and at once after a change."""
 
-import time
 from collections.abc import Callable
 
 from msgspec import Struct
@@ -33,12 +32,6 @@ class Clock(Struct, frozen=True):
         if read_at is None:
             return Time()
         return stamps.stamp(self.wall() - (self.monotonic() - read_at))
-
-
-def machine_s() -> float:
-    """Return the time (s) since the machine's start, including the time in which the machine was
-    suspended."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class PublishPace:

@@ -23,6 +23,9 @@ without a drop-in, its value is `nothing`."""
 ROUND_S: Final = 1.25
 LEAST_S: Final = 3.0
 WITHOUT_OUTPUTS_S: Final = 10.0
+JOINS_RMF_S: Final = 3.0
+"""The time (s) that RMF's adapter may take to join RMF. Meanwhile it stops every thread of the
+process (rmf_ros2, adapter.cpp: `make` keeps Python's global lock)."""
 LOCAL: Final = ("localhost", "multicast")
 
 
@@ -64,10 +67,14 @@ def watchdog_s(config: Config) -> float:
 
     A loop finishes a step at least each second, because it publishes states each second. One bus call
     may delay the step by at most half of the watchdog time. A daemon without outputs gets a longer
-    time, because a slow disk may delay a step.
+    time, because a slow disk may delay a step. So does a fleet's daemon, which stands still while it
+    joins RMF.
     """
     slowest = max((getattr(bus, "timeout_s", 0.0) for bus in config.buses.values()), default=0.0)
-    return max(LEAST_S, 1.75 * slowest + ROUND_S) if config.buses else WITHOUT_OUTPUTS_S
+    if not config.buses:
+        return WITHOUT_OUTPUTS_S
+    joins_s = JOINS_RMF_S if config.kind == "fleet" else 0.0
+    return max(LEAST_S, 1.75 * slowest + ROUND_S) + joins_s
 
 
 def _unit(config: Config) -> list[str]:

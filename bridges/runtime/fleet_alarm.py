@@ -7,6 +7,7 @@ of a device. The alarm's memory is written to disk before a message is published
 
 import logging
 import math
+import threading
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Final
@@ -42,6 +43,9 @@ log = logging.getLogger(__name__)
 QUIET_S: Final = 3.0
 """The silence (s) after which another node of ours counts as dead. A node states its alarm each second,
 so three statements are missing."""
+MOST_UNNAMED: Final = 200
+"""The number of senders whose names are still sought. Anybody can publish an alarm and leave without a
+name."""
 ALARM: Final = "alarm"
 """The name of this node's only subject, which is the alarm itself."""
 
@@ -116,6 +120,7 @@ class FleetAlarmNode(
         self._twin_at = -math.inf
         self._counted = 0
         self._unnamed: dict[str, tuple[Sender | None, str]] = {}
+        self._naming = threading.Lock()  # the transport's thread and the main thread use `_unnamed`
         super().__init__(
             _kind(limits), GraphSettings(), transport, clock, named, kept, MessagesOnly(writer)
         )
@@ -211,12 +216,13 @@ class FleetAlarmNode(
     def _on_alarm(self, topic: Topic[Message]) -> Callable[[Message], None]:
         def put(message: Message) -> None:
             sender = self._transport.sender()
-            names = self._names(sender, topic.name) or [self._unknown(sender, topic.name)]
-            event = alarming.heard(message, names)
-            if event.senders != {self._transport.name}:  # not by our earlier run
-                name = self._named(topic).name
-                self._writer.spoken(name, message, sent=False, sender=sender)
+            names = self._names(sender, topic.name)
+            with self._naming:
+                event = alarming.heard(message, names or [self._unknown(sender, topic.name)])
+                if event.senders == {self._transport.name}:  # by our earlier run
+                    return
                 self.inbox.put(ALARM, (topic, event))
+            self._writer.spoken(self._named(topic).name, message, sent=False, sender=sender)
 
         return put
 
@@ -238,14 +244,19 @@ class FleetAlarmNode(
         self._counted += 1
         name = f"{UNKNOWN} {self._counted}"
         self._unnamed[name] = (sender, topic)
+        if len(self._unnamed) > MOST_UNNAMED:
+            del self._unnamed[next(iter(self._unnamed))]
         return name
 
     def _name_senders(self) -> None:
-        for unknown, (sender, topic) in list(self._unnamed.items()):
+        with self._naming:
+            unnamed = list(self._unnamed.items())
+        for unknown, (sender, topic) in unnamed:
             if names := self._names(sender, topic):
-                del self._unnamed[unknown]
                 named = AlarmNamed(unknown, frozenset(name.lstrip("/") for name in names))
-                self.inbox.put(ALARM, (self._limits.topic, named))
+                with self._naming:
+                    self._unnamed.pop(unknown, None)
+                    self.inbox.put(ALARM, (self._limits.topic, named))
 
     def _on_statement(self, message: DiagnosticArray) -> None:
         for event in alarming.stated(message):

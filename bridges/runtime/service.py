@@ -26,7 +26,7 @@ from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.messages.definitions import Message
 from bridges.messages.topics import M_co, Topic
 from bridges.messages.words import LONGEST_NAME
-from bridges.runtime.clock import Clock, machine_s
+from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode, Node
 from bridges.runtime.device_memory import AlarmMemory, DeviceMemories
 from bridges.runtime.diagnostics import BUSES
@@ -42,6 +42,7 @@ from bridges.runtime.serving import Rounds, Serving
 from bridges.runtime.subject import AnySubject, Status, refusals_of
 from bridges.settings.load import Config
 from bridges.system.log import pairs
+from bridges.system.machine_time import machine_s
 from bridges.transports.transport import Subscription, Transport
 from drivers import TakesInputs
 from drivers.hal import Bus

@@ -165,8 +165,13 @@ class Seldom(logging.Filter):
         super().__init__()
         self._now = now
         self._runs: dict[str, _Run] = {}
+        self._counting = threading.Lock()  # logging calls a handler's filters without a lock
 
     def filter(self, record: logging.LogRecord) -> bool:
+        with self._counting:
+            return self._passes(record)
+
+    def _passes(self, record: logging.LogRecord) -> bool:
         now, text = self._now(), self.SECONDS.sub("", record.getMessage())
         run = self._runs.pop(text, None)
         if run is None or now - run.last_at > self.PAUSE_S:

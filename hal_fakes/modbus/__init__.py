@@ -79,7 +79,7 @@ class ModbusServer:
         self._thread = threading.Thread(target=self._loop.run_forever, name="modbus", daemon=True)
         self._thread.start()
         self._run(self._listen())
-        self._watch = asyncio.run_coroutine_threadsafe(self._look(), self._loop)
+        asyncio.run_coroutine_threadsafe(self._look(), self._loop)
         self.replace: dict[str, object] = {"tcp": {"host": "127.0.0.1", "port": self._port}}
 
     def close(self) -> None:
@@ -87,8 +87,7 @@ class ModbusServer:
         if self._closed:
             return
         self._closed = True
-        self._watch.cancel()
-        self._run(self._hang_up())
+        self._run(self._end())
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
@@ -113,6 +112,15 @@ class ModbusServer:
             server, self._server = self._server, None
             await server.shutdown()
         await asyncio.sleep(0)  # the connections close in the next round of the loop
+
+    async def _end(self) -> None:
+        """Close every connection, and end every task. A request that is answered slowly may still have
+        one. asyncio would log such a task as an error whenever it is freed, even much later."""
+        await self._hang_up()
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _look(self) -> None:
         """Stop the server when its failure `off` begins, and start it when the failure ends. Let

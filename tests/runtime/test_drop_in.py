@@ -25,6 +25,7 @@ GPIO = ["WatchdogSec=3", "DeviceAllow=char-gpiochip rw", "SupplementaryGroups=gp
 CAN = ["WatchdogSec=3", "PrivateDevices=yes", "RestrictAddressFamilies=AF_CAN"]
 NET = ["WatchdogSec=3", "PrivateDevices=yes"]
 GRAPH = ["WatchdogSec=10", "PrivateDevices=yes"]
+FLEET = ["WatchdogSec=6", "PrivateDevices=yes"]  # RMF's adapter stops the process for 3 s
 SHIPPED = {
     "alarm_http": NET,
     "alarm_panel": GPIO,
@@ -62,9 +63,9 @@ SHIPPED = {
     "lift_relay_board": GPIO,
     "lift_supervisor": GRAPH,
     "lift_two_buses": GPIO,
-    "robots_http": NET,
-    "robots_traffic_light": NET,
-    "robots_vda5050": NET,
+    "robots_http": FLEET,
+    "robots_traffic_light": FLEET,
+    "robots_vda5050": FLEET,
 }
 
 

@@ -13,7 +13,7 @@ from bridges.messages.releases import NEWEST, RELEASES, Release
 from bridges.messages.topics import DIAGNOSTICS, EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic
 from bridges.runtime.clock import Clock
 from bridges.runtime.diagnostics import diagnosis
-from bridges.runtime.fleet_alarm import FleetAlarmNode
+from bridges.runtime.fleet_alarm import MOST_UNNAMED, FleetAlarmNode
 from bridges.runtime.outlet import Named
 from tests.runtime.virtual_graph import Disk
 from tests.transports.memory import MemoryNetwork, MemoryTransport
@@ -192,6 +192,18 @@ def test_an_unnamed_sender_is_named_when_discovery_knows_it() -> None:
     site.until(6.0)
     [fault] = site.nodes["a"].status()["faults"]
     assert fault["detail"] == "reset here, but the alarm of desk is not over"
+
+
+def test_the_unnamed_senders_of_alarms_are_limited() -> None:
+    site = Site()
+    site.start("a")
+    for number in range(MOST_UNNAMED + 5):
+        publisher = MemoryTransport(site.network, f"desk{number}", NEWEST).publisher(
+            FIRE_ALARM_TRIGGER
+        )
+        publisher.sender.node = ""
+        publisher.publish(d.Bool(False))
+    assert len(site.nodes["a"]._unnamed) == MOST_UNNAMED
 
 
 @pytest.mark.parametrize(("nobody", "heard"), [(False, [d.Bool(True)]), (True, [])])

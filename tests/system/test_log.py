@@ -3,6 +3,8 @@
 import json
 import logging
 import os
+import sys
+import threading
 import weakref
 from datetime import datetime
 
@@ -44,6 +46,31 @@ def test_a_line_that_keeps_coming_is_held_back_and_its_number_is_told() -> None:
     now = 1311.0
     record = logging.LogRecord("bridges", logging.INFO, "", 0, said[0][1], None, None)
     assert seldom.filter(record)
+
+
+def test_threads_may_log_different_lines_at_the_same_time() -> None:
+    """logging calls a handler's filters without a lock. More than MOST lines make the filter forget."""
+    seldom, errors = Seldom(), list[Exception]()
+
+    def log(who: int) -> None:
+        try:
+            for number in range(3 * Seldom.MOST):
+                text = f"{who} {number}"
+                seldom.filter(logging.LogRecord("bridges", logging.INFO, "", 0, text, None, None))
+        except Exception as error:  # noqa: BLE001 - a thread's error would be lost
+            errors.append(error)
+
+    interval_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        threads = [threading.Thread(target=log, args=(who,)) for who in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        sys.setswitchinterval(interval_s)
+    assert errors == []
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import logging
 import os
+import threading
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
@@ -18,9 +19,11 @@ from bridges.transports import addresses
 from bridges.transports.transport import TransportError
 from bridges.transports.zenoh import alone as zenoh_alone
 from bridges.transports.zenoh import config as zenoh_config
+from bridges.transports.zenoh import session
 from bridges.transports.zenoh import transport as zenoh_transport
 from bridges.transports.zenoh.transport import ZenohTransport
 from tests.transports import peer
+from tests.transports.joining import Join
 from tests.transports.zenoh_programs import Router, free_port, meeting
 from tests.waiting import wait_until
 
@@ -456,3 +459,27 @@ def test_a_node_whose_router_does_not_answer_says_so_as_a_fault(site: Site) -> N
     )
     site.router(endpoint)
     wait_until(lambda: lift.faults() == [], "the fault is over")
+
+
+def test_publishers_are_declared_while_the_node_waits_for_a_silent_router(
+    join_zenoh: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A scan that waited for an attempt of 10 s would end by the watchdog."""
+    node = join_zenoh("node")
+    opens, answers = threading.Event(), threading.Event()
+
+    def opened(ways: Any) -> Any:
+        opens.set()
+        answers.wait()
+        return session.opened(ways)
+
+    monkeypatch.setattr(zenoh_transport, "opened", opened)
+    assert isinstance(node, ZenohTransport)
+    node._orders.put(node._join_anew)
+    wait_until(opens.is_set, "the node tries to join again")
+    declares = threading.Thread(target=node.publisher, args=(LIFT_STATES,))
+    declares.start()
+    wait_until(lambda: not declares.is_alive(), "the publisher is declared")
+    answers.set()
+    heard = join_zenoh("other").subscribe(LIFT_STATES, print)
+    wait_until(lambda: heard.matched() == 1, "the publisher is on the graph")

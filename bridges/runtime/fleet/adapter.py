@@ -18,12 +18,12 @@ from typing import Any, Final
 
 from bridges.kinds.fleet.places import EVERY_LEVEL
 from bridges.kinds.fleet.report import RobotReport
+from bridges.runtime.drop_in import JOINS_RMF_S
 from bridges.runtime.fleet.light import RmfLight
 from bridges.runtime.fleet.robot import Put, RmfRobot
 from bridges.settings.fleet_site import FleetSite
 from bridges.transports.transport import TransportError
 
-MAKE_S: Final = 3.0
 NOT_PASSED: Final = "RMF's adapter is of another version, or config.yaml does not have the robot"
 
 
@@ -69,7 +69,8 @@ class FleetAdapter:
         rmf.init_rclcpp()
 
     def connect(self) -> bool:
-        """Join RMF. Return False if RMF has no schedule node. The whole process waits for up to MAKE_S.
+        """Join RMF. Return False if RMF has no schedule node. The whole process waits for up to
+        JOINS_RMF_S.
 
         Raises TransportError if RMF's adapter refuses the fleet's configuration or navigation graph.
         """
@@ -87,7 +88,7 @@ class FleetAdapter:
                 shift = [found.shift.real, found.shift.imag]
                 transform = self._rmf.Transformation(found.rotation, found.scale, shift)
                 configuration.add_robot_coordinates_transformation(level, transform)
-        wait = datetime.timedelta(seconds=MAKE_S)
+        wait = datetime.timedelta(seconds=JOINS_RMF_S)
         self._adapter = self._rmf.Adapter.make(self.name, wait_time=wait)
         if self._adapter is None:
             return False

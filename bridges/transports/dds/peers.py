@@ -19,7 +19,10 @@ HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 TYPE: Final = re.compile(r"(\w+)::msg::dds_::(\w+)_")
 """The pattern of a message's name in ROS's DDS."""
 
-_reading = threading.Lock()
+READING: Final = threading.Lock()
+"""Whoever reads the QoS of another end holds this lock. cyclonedds reads each QoS into the same
+variables (11.0.1, qos._CQos._gc_*). If two threads read at the same time, an end gets another end's
+user data. This can happen, because a process may have several nodes, each with its own thread."""
 
 
 class _State(Protocol):
@@ -37,12 +40,7 @@ class _End(Protocol):
 
 
 class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TID251
-    """A reader of announcements of participants and ends. Only one thread of the process may read at a
-    time.
-
-    cyclonedds reads the QoS of each announcement into the same variables (11.0.1, qos._CQos._gc_*). If
-    two threads read at the same time, an end gets another end's user data. This can happen, because a
-    process may have several nodes, each with its own thread.
+    """A reader of announcements of participants and ends.
 
     Only the thread that reads may delete the reader, or another thread after the reading thread's end.
     Otherwise the process may end by a segmentation fault (11.0.1, clayer/pysertype.c: the samples that
@@ -51,7 +49,7 @@ class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TI
 
     def take(self, count: int) -> list[Any]:
         """Take at most `count` new announcements."""
-        with _reading:
+        with READING:
             taken: list[Any] = super().take(count)
         return taken
 

@@ -156,19 +156,36 @@ class ZenohTransport(Threaded):
     # --- the session ---------------------------------------------------------------------------
 
     def _join(self) -> None:
-        """Try to open a session. A client gets a session only after a router has answered."""
+        """Try to open a session, and join the graph in it. A client gets a session only after a router
+        has answered.
+
+        The caller does not hold the lock: the attempt takes 10 s if the router's machine is silent, and
+        the lock would keep other threads from publishing, and so from their scans.
+        """
+        session = self._opened()
+        if session is None:
+            return
+        with self._lock:
+            if self._closed:
+                closed(session, [])
+            else:
+                self._enter(session)
+
+    def _opened(self) -> zenoh.Session | None:
         self._addresses = addresses.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self.domain_id)
         else:
             ways = [zenoh_config.on_the_site(self._settings)]
         try:
-            session = opened(ways)
+            return opened(ways)
         except zenoh.ZError as error:
             self._why_unlinked = str(error).partition(" at /")[
                 0
             ]  # without the place in zenoh's source
-            return
+            return None
+
+    def _enter(self, session: zenoh.Session) -> None:
         way, name = WAYS[self._settings.keys], str(session.zid())
         self._keys: Keys = way(self.domain_id, name, self.name, self.release)
         self._numbers = count(1)
@@ -257,9 +274,10 @@ class ZenohTransport(Threaded):
                 return
             self._leave()
             self._closing = [closing for closing in self._closing if closing.is_alive()]
-            try:
-                self._join()
-            except (TransportError, zenoh.ZError) as error:  # e.g. a missing secret
+        try:
+            self._join()
+        except (TransportError, zenoh.ZError) as error:  # e.g. a missing secret
+            with self._lock:
                 self._why_unlinked = str(error)
                 self._leave()
 

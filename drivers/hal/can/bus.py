@@ -12,10 +12,10 @@ controller reports a restart. `restart-ms` of `ip link` makes the controller res
 """
 
 import random
-import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Final
 
+from bridges.system.machine_time import machine_s
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.can.frames import Frame, FrameFilter, Hear, LinkDown, Trouble, named
@@ -41,7 +41,7 @@ class CanBus(Bus):
     def __init__(
         self,
         settings: CanSettings,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = machine_s,
         jitter: Callable[[], float] = random.random,
         vendor: "Vendor | None" = None,
     ) -> None:

@@ -3,7 +3,7 @@
 import logging
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import MappingProxyType
 from typing import Protocol
 
@@ -145,6 +145,16 @@ class GpioLines:
     def write(self, levels: Mapping[str, bool]) -> None:
         """Drive these outputs. If an output fails, still try every output that should go to its safe
         level. Raises HalError."""
+        unsafe = bool(levels.items() - self._safe.items())
+        try:
+            self._drive(levels)
+        finally:
+            if self._dropped and unsafe:
+                self.drop()  # the dead-man intervened during this write, so switch off again
+        if unsafe:
+            self._check()
+
+    def _drive(self, levels: Mapping[str, bool]) -> None:
         every = Every()
         for point, level in levels.items():
             if level != self._safe[point]:
@@ -153,20 +163,15 @@ class GpioLines:
             with every.one(), _hal_errors(point):
                 self._of(point).state = level
         every.check()
-        if self._dropped and levels.items() - self._safe.items():
-            self.drop()  # the dead-man intervened during this write, so switch off again
-            self._check()
 
     def drop(self) -> None:
         """Set every output to its safe level, and refuse other levels until the next claim. Any thread
         may call `drop`. Does not raise."""
         self._dropped = True
-        for point, level in self._safe.items():
-            if point in self._claimed:
-                try:
-                    self._claimed[point].state = level
-                except _failures():
-                    continue  # still switch the other outputs off
+        for point, pin in self._claimed.copy().items():  # another thread may release the pins
+            if point in self._safe:
+                with suppress(Exception):  # still switch the other outputs off
+                    pin.state = self._safe[point]
 
     def outputs(self) -> dict[str, bool]:
         """Read the outputs' levels from the chip. Raises HalError."""

@@ -27,7 +27,6 @@ connection's thread calls `take` for each message. This is for a driver that mus
 
 import math
 import random
-import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -36,6 +35,7 @@ from typing import TYPE_CHECKING, Final
 
 import msgspec
 
+from bridges.system.machine_time import machine_s
 from drivers.hal import Bus, HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.mqtt.lines import MqttLines
@@ -81,7 +81,7 @@ class MqttBus(Bus):
     def __init__(
         self,
         settings: MqttSettings,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = machine_s,
         jitter: Callable[[], float] = random.random,
     ) -> None:
         self.now = clock
@@ -315,7 +315,7 @@ class MqttBus(Bus):
         from drivers.hal.mqtt.link import Link
 
         old = self._link
-        if old is not None and old.is_alive() and not old.failure:
+        if old is not None and old.is_alive() and old.connecting:
             raise HalError("the last attempt to reach the broker has not ended yet")
         self._heard.clear()
         self._kept = 0

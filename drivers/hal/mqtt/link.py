@@ -49,7 +49,8 @@ connection's thread calls the function."""
 
 class Link(threading.Thread):
     """A connection. `up` is True while the link is connected and has subscribed to its topics.
-    `failure` is the reason for the connection's end.
+    `failure` is the reason for the connection's end. While `connecting`, the thread may hang in the
+    lookup of the broker's name, even after `close`.
 
     `refused` holds the broker's reason for each topic whose subscription the broker refused. When one
     of these attributes changes, the thread notifies `changed`. When the connection ends, the thread
@@ -66,6 +67,7 @@ class Link(threading.Thread):
         self._settings = settings
         self._topics = list(topics)
         self._take = take
+        self.connecting = True
         self._closing = False
         self._acks: dict[int, str] = {}
         self._asked: dict[int, list[str]] = {}
@@ -81,6 +83,7 @@ class Link(threading.Thread):
             self._client.connect(
                 host, port, self._settings.keepalive_s, **_connect_options(self._v5)
             )
+            self.connecting = False
             while not self._closing and self._client.loop(LOOK_S) == paho.MQTT_ERR_SUCCESS:
                 pass
         except OSError as error:
@@ -146,9 +149,19 @@ class Link(threading.Thread):
         client.on_message = self._on_message
         client.on_publish = self._on_publish
         client.on_disconnect = self._on_disconnect
-        client.on_socket_open = _without_delay
+        client.on_socket_open = self._on_socket_open
         client.on_socket_register_write = _nothing  # only this thread may write to the socket
         return client
+
+    def _on_socket_open(self, _c: Any, _u: Any, sock: Any) -> None:
+        """Send each message at once. With Nagle's algorithm a command might wait 40 ms for an ACK.
+
+        Send nothing if the link was closed while the broker's name was looked up. Otherwise the broker
+        would end the next link, which has the same client's id.
+        """
+        if self._closing:
+            raise ConnectionAbortedError
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def _on_connect(self, _c: Any, _u: Any, flags: Any, reason: ReasonCode, _p: Any) -> None:
         if reason.is_failure:
@@ -205,18 +218,20 @@ class Link(threading.Thread):
     def _ended(self, failure: str) -> None:
         if cut := self._client.cut:
             failure = cut
+        has_connected, self.connecting = not self.connecting, False
         with self.changed:
             self.up, self.failure = False, self.failure or failure
             self.changed.notify_all()
-        self._client.disconnect()
-        self._client.loop_write()
+        if has_connected:
+            self._client.disconnect()
+            self._client.loop_write()
         if (sock := self._client.socket()) is not None:
             sock.close()  # close anyway, because a broker may never read DISCONNECT
         # The client closes the sockets that wake this thread only when nobody refers to it any more. So
         # it may not refer to the link, or both would wait for the garbage collector.
         client = self._client
         client.on_connect = client.on_subscribe = client.on_message = None
-        client.on_publish = client.on_disconnect = None
+        client.on_publish = client.on_disconnect = client.on_socket_open = None
         self.on_end()
 
     def _explained(self, error: OSError) -> str:
@@ -281,11 +296,6 @@ def _tls(settings: BrokerTls) -> ssl.SSLContext:
     except (OSError, ValueError) as error:
         raise HalError(f"tls: the certificates cannot be used: {excerpt(str(error))}") from None
     return context
-
-
-def _without_delay(client: object, _: object, sock: Any) -> None:
-    """Send each message at once. With Nagle's algorithm a command might wait 40 ms for an ACK."""
-    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
 def _nothing(client: object, _: object, sock: object) -> None:

@@ -27,7 +27,7 @@ from bridges.messages.topics import (
     DOOR_SUPERVISOR_HEARTBEAT,
     LIFT_REQUESTS,
 )
-from bridges.runtime.clock import machine_s
+from bridges.system.machine_time import machine_s
 from bridges.transports.transport import Transport
 from hal_fakes.demo.daemons import DaemonProcess, stop_all
 from hal_fakes.wire import wire

@@ -1,5 +1,8 @@
 """The dead-man switch, a thread beside the loop. The thread is real, and time is virtual."""
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
 from drivers.hal.gpio.dead_man import AFTER_S, GpioDeadMan
@@ -67,4 +70,50 @@ def test_a_loop_that_goes_on_is_left_alone(bench: Bench) -> None:
     bench.points.write({"call": True, "hold": True})
     assert sorted(bench.relays()) == [("call", True), ("hold", True)]
     bench.points.close()
+    bench.bus.close()
+
+
+class LatePin:
+    """A pin that is switched only after another thread has done something: `meanwhile`, once."""
+
+    def __init__(self, pin: Any, meanwhile: Callable[[], object]) -> None:
+        self._pin, self._meanwhile = pin, [meanwhile]
+
+    @property
+    def state(self) -> int:
+        return int(self._pin.state)
+
+    @state.setter
+    def state(self, level: int) -> None:
+        while self._meanwhile:
+            self._meanwhile.pop()()
+        self._pin.state = level
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._pin, name)
+
+
+def late(bench: Bench, output: str, meanwhile: Callable[[], object]) -> None:
+    (lines,) = bench.bus._devices
+    point = bench.points._out[output][1]
+    lines._claimed[point] = LatePin(lines._claimed[point], meanwhile)
+
+
+def test_no_relay_stays_on_that_is_switched_on_while_the_dead_man_drops_the_outputs() -> None:
+    for outputs in (["call"], ["call", "hold"]):
+        bench = Bench()
+        bench.points.open()
+        late(bench, "call", bench.bus._drop)
+        with pytest.raises(HalError, match="no scan finished for 2 s"):
+            bench.points.write(dict.fromkeys(outputs, True))
+        assert dict(bench.relays())["call"] is False
+        bench.points.close()
+        bench.bus.close()
+
+
+def test_the_dead_man_drops_every_output_although_the_loop_releases_the_pins(bench: Bench) -> None:
+    (lines,) = bench.bus._devices
+    late(bench, "call", lines._claimed.clear)
+    lines.drop()
+    assert dict(bench.relays()) == {"call": False, "hold": False}
     bench.bus.close()

@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,42 @@ def device(broker: Mosquitto) -> Iterator[FarDevice]:
 @pytest.fixture(params=VERSIONS)
 def version(request: pytest.FixtureRequest) -> str:
     return str(request.param)
+
+
+# ---- the lookup of the broker's name
+
+
+def test_no_second_attempt_begins_during_a_slow_lookup_and_a_link_that_was_given_up_sends_nothing(
+    broker: Mosquitto, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The broker would end the good connection, because both have the same client's id."""
+    look_up, asked, answered = socket.getaddrinfo, list[object](), threading.Event()
+
+    def lookup(host: object, *given: Any, **more: Any) -> Any:
+        asked.append(host)
+        answered.wait()
+        return look_up("127.0.0.1", *given, **more)
+
+    monkeypatch.setattr(socket, "getaddrinfo", lookup)
+    clock = itertools.count(0.0, 60.0).__next__  # no pause is left at the next attempt
+    names: dict[str, Any] = {"host": "broker.site", "client_id": "lift1", "timeout_s": 0.2}
+    with bus_to(broker.port, clock=clock, **names) as bus:
+        for text in ("does not answer within 0.2 s", "has not ended yet"):
+            with pytest.raises(HalError, match=text):
+                bus.up()
+        first = bus._link
+        assert first is not None
+        answered.set()
+        first.join()
+        assert (first.up, first._client.is_connected(), asked) == (False, False, ["broker.site"])
+        wait_until(lambda: _is_up(bus), "the next attempt reaches the broker")
+
+
+def _is_up(bus: MqttBus) -> bool:
+    try:
+        return bus.up().up
+    except HalError:
+        return False
 
 
 # ---- which messages the bus trusts
