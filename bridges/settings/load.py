@@ -35,7 +35,7 @@ from bridges.settings import names as named
 from bridges.settings.alarms import note_alarms
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
-from bridges.settings.plausible import late_inputs, milliseconds
+from bridges.settings.plausible import late_inputs, long_calls, milliseconds
 from bridges.settings.renamed_keys import read_as_renamed
 from bridges.settings.top import MAPPING, keys_below, owner, top_keys, word
 from bridges.settings.wiring import (
@@ -384,14 +384,15 @@ class _DeviceReading:
 
     def _collect_bus_remarks(self) -> None:
         """Collect remarks about each bus. One remark is about outputs that stay on when this machine
-        fails. Another remark is about a bus that is read too slowly."""
+        fails. Others are about a bus that is read too slowly, or that waits too long for an answer."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))
             devices = [one for device, one in self._devices.items() if name in self._on[device]]
             points = [use.point for use in self._uses if use.bus == name]
             paced = bus.hal.paced(bus.settings, devices, points)
-            for path, text in (*unwatched.warnings, *paced):
+            late = long_calls(bus.settings, devices)
+            for path, text in (*unwatched.warnings, *paced, *late):
                 self._warn(locate(bus.entry.spot(), path).where(), f"bus '{name}': {text}")
             for path, text in unwatched.notes:
                 node = locate(bus.entry.spot(), path).where()

@@ -60,6 +60,22 @@ def out_of_step(device: DeviceSettings, bus: object, others: Iterable[object] = 
             )
 
 
+def long_calls(bus: object, devices: Iterable[DeviceSettings]) -> Remarks:
+    """Yield a remark if a call to a silent device takes longer than a reading stays fresh. The daemon
+    publishes nothing during a call."""
+    limits = [stale_s for each in devices if (stale_s := each.stale_after()) is not None]
+    attempts = 1 + getattr(bus, "retries", 0)
+    call_s = attempts * getattr(bus, "timeout_s", 0.0)
+    if limits and call_s > min(limits):
+        times = f" x {attempts} attempts" if attempts > 1 else ""
+        text = f"a call to a silent device takes {call_s:g} s (timeout_s{times})"
+        yield (
+            ("timeout_s",),
+            f"{text}, but stale_after_s is {min(limits):g}: RMF hears only later that the device is"
+            " silent; lower timeout_s, or raise stale_after_s",
+        )
+
+
 def late_inputs(device: DeviceSettings, debounce: Mapping[str, float]) -> Remarks:
     """Yield a problem for each limit that is over before the input that it waits for can count.
     `debounce` maps a signal to its debounce (s)."""

@@ -40,6 +40,16 @@ def test_the_unchanged_door_gives_no_problem_and_no_warning(file: Path) -> None:
     assert warnings_of(file, door()) == []
 
 
+def test_a_call_that_outlasts_the_readings_gives_a_warning(file: Path) -> None:
+    slow = door(f"{TCP}, timeout_s: 1.2, retries: 1")
+    assert warnings_of(file, slow) == [
+        "5:64: warning: bus 'module': a call to a silent device takes 2.4 s (timeout_s x 2"
+        " attempts), but stale_after_s is 1: RMF hears only later that the device is silent; lower"
+        " timeout_s, or raise stale_after_s"
+    ]
+    assert warnings_of(file, door(f"{TCP}, timeout_s: 0.5, retries: 1")) == []
+
+
 KEEPS = (
     "when this machine or the cable dies: arm the watchdog of the module (module_watchdog), or write"
     " why that is safe (without_watchdog)"
