@@ -55,7 +55,7 @@ hatches:
 ON_MODBUS = {
     "type": "modbus",
     "tcp": {"host": "192.0.2.1", "port": 502},
-    "timeout_s": 2,
+    "timeout_s": 0.5,
     "without_watchdog": {1: "a bench"},
 }
 ON_A_LINE = {"type": "line", "host": "192.0.2.1"}
