@@ -46,7 +46,7 @@ from bridges.kinds.door_supervisor.signals import (
     RequesterOpens,
 )
 from bridges.kinds.shared.decision import Decision, Said
-from bridges.kinds.shared.durations import FORGOTTEN_S, NEVER, SILENT_S, due_at
+from bridges.kinds.shared.durations import FORGOTTEN_S, NEVER, due_at
 from bridges.kinds.shared.freshness import Rules, hear
 from bridges.kinds.shared.graph_kind import MaySpeak
 from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest
@@ -105,7 +105,7 @@ def _take(memory: SupervisedDoor, event: Event, now: float) -> tuple[SupervisedD
         case RequesterOpens() | RequesterCloses():
             return _hear(memory, event, now)
         case DoorStateHeard(mode):
-            returns = memory.mode in UNSURE or now >= memory.shown_at + SILENT_S
+            returns = memory.mode in UNSURE or now >= memory.silent_at
             return _see(replace(memory, mode=mode, shown_at=now), now, returns), ""
         case MaySpeak(yes, at_once, waits=passive):
             memory = replace(memory, may_speak=yes, at_once=at_once, passive=passive)
